@@ -1,0 +1,95 @@
+"""One turn of a 2-D lidar, each beam with its own angle and its own time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contourslam.errors import ScanError
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """A scan as it came from the sensor; nothing is filtered yet.
+
+    Attributes
+    ----------
+    stamp : float
+        Time of the first beam in s.
+    angles : ndarray, shape (n,)
+        Direction of each beam in the lidar's frame, rad, counter-clockwise. They need not be evenly spaced
+        and may change in number from scan to scan.
+    ranges : ndarray, shape (n,)
+        Range of each beam in m. NaN, inf, zero and values outside the limits mean "no return".
+    offsets : ndarray, shape (n,)
+        Time of each beam after `stamp`, s.
+    range_min, range_max : float
+        Limits inside which a range is a measurement, m.
+
+    Raises
+    ------
+    ScanError
+        If the three arrays differ in shape, or a stamp, angle, offset or limit is not finite.
+    """
+
+    stamp: float
+    angles: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    range_min: float
+    range_max: float
+
+    def __post_init__(self) -> None:
+        for name in ("angles", "ranges", "offsets"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        shape = self.ranges.shape
+        if len(shape) != 1 or self.angles.shape != shape or self.offsets.shape != shape:
+            raise ScanError(
+                f"scan at stamp {self.stamp}: angles {self.angles.shape}, ranges {shape} and offsets "
+                f"{self.offsets.shape} must be vectors of one length"
+            )
+        if not (np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()):
+            raise ScanError(f"scan at stamp {self.stamp}: a stamp, angle or time offset is not finite")
+        if not 0.0 <= self.range_min < self.range_max:
+            raise ScanError(
+                f"scan at stamp {self.stamp}: range limits [{self.range_min}, {self.range_max}] m are not a range"
+            )
+
+
+def evenly_spaced(
+    stamp: float,
+    ranges: ArrayLike,
+    *,
+    angle_min: float,
+    angle_increment: float,
+    range_min: float,
+    range_max: float,
+    time_increment: float = 0.0,
+) -> LaserScan:
+    """Build a scan from evenly spaced beams, the form in which ROS and CARMEN carry it.
+
+    Parameters
+    ----------
+    stamp : float
+        Time of the first beam, s.
+    ranges : array_like, shape (n,)
+        Ranges, m.
+    angle_min, angle_increment : float
+        Direction of the first beam and the step to the next, rad.
+    range_min, range_max : float
+        Range limits, m.
+    time_increment : float
+        Time between two beams, s.
+
+    Raises
+    ------
+    ScanError
+        As :class:`LaserScan`.
+    """
+    values = np.asarray(ranges, dtype=np.float64)
+    index = np.arange(values.size, dtype=np.float64)
+    return LaserScan(
+        stamp, angle_min + angle_increment * index, values, time_increment * index, range_min, range_max
+    )
