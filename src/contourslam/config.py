@@ -3,18 +3,20 @@
 Pure data on purpose: the command line is generated from these classes, and asking it for help loads nothing else.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
 from contourslam.errors import ConfigError
 
-DetectorName = str
 Association = Literal["nearest", "mahalanobis", "mutual", "joint"]
 
 
-def _require(condition: bool, message: str) -> None:
-    if not condition:
-        raise ConfigError(message)
+def _check_positive(config: object, *names: str) -> None:
+    for name in names:
+        value = getattr(config, name)
+        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+            raise ConfigError(f"{type(config).__name__}.{name} must be a positive number, got {value!r}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,18 +24,128 @@ class LidarConfig:
     """The lidar and where it sits."""
 
     mount_x: float = 0.0
-    """Lidar ahead of the middle of the axle, m (d of eq. 30). A recording's own static transform wins over the three."""
+    """Lidar ahead of the middle of the axle, m (d of eq. 30); a transform in the recording wins over the three."""
     mount_y: float = 0.0
     """Lidar to the left of the middle of the axle, m."""
     mount_yaw: float = 0.0
     """Direction of the lidar's zero beam in the base frame, rad."""
     sigma_range: float = 0.01
-    """Standard deviation of one range, m. Where the points of a wall scatter more, their own scatter is used."""
+    """Standard deviation of one range, m; where a wall's points scatter more, their own scatter is used."""
     max_range: float = 30.0
     """Ranges beyond this are ignored, m."""
-    beam_width_deg: float = 0.5
-    """Least angular resolution to expect, degrees: below it two beams may see one spot."""
 
     def __post_init__(self) -> None:
-        _require(self.sigma_range > 0, f"lidar.sigma_range must be positive, got {self.sigma_range}")
-        _require(self.max_range > 0, f"lidar.max_range must be positive, got {self.max_range}")
+        _check_positive(self, "sigma_range", "max_range")
+
+
+@dataclass(frozen=True, slots=True)
+class ContourConfig:
+    """Cutting a scan into contours and equalizing them (eqs 1-11)."""
+
+    breakpoint_angle_deg: float = 10.0
+    """Shallowest angle between a beam and a surface still followed (lambda of Borges and Aldon 2004), degrees."""
+    breakpoint_sigmas: float = 3.0
+    """Range noise allowed for in the breakpoint distance, in standard deviations."""
+    max_gap: float = 1.0
+    """Two neighbouring points farther apart than this, m, are never one contour."""
+    min_points: int = 4
+    """A contour of fewer points is dropped, mixed pixels among them."""
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "breakpoint_angle_deg", "breakpoint_sigmas", "max_gap", "min_points")
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkConfig:
+    """Refinement of corners and extraction of walls."""
+
+    min_side: float = 0.25
+    """Each side of a corner is at least this long, m."""
+    max_side: float = 2.0
+    """No more than this of each side is used for the refinement, m."""
+    min_side_points: int = 5
+    """Each side of a corner has at least this many beams."""
+    max_opening_deg: float = 150.0
+    """A corner opens by no more than this, degrees: beyond it its position is poorly known."""
+    min_opening_deg: float = 20.0
+    """A corner opens by at least this, degrees."""
+    min_wall: float = 0.5
+    """A wall segment is at least this long, m."""
+    min_wall_points: int = 8
+    """A wall segment has at least this many beams."""
+    position_floor: float = 0.004
+    """Standard deviation added to a corner's position and a wall's distance for what the noise does not explain, m."""
+    angle_floor_deg: float = 0.2
+    """Standard deviation added to a wall's direction for what the noise does not explain, degrees."""
+    refined: bool = True
+    """Refine each corner by intersecting the lines fitted to its sides; off, the raw contour vertex is used."""
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "min_side", "max_side", "min_side_points", "min_wall", "min_wall_points")
+
+
+@dataclass(frozen=True, slots=True)
+class MotionConfig:
+    """Noise of the wheel odometry (R of eq. 24), growing with the distance and angle driven."""
+
+    forward_per_sqrt_m: float = 0.02
+    """Standard deviation of the distance after one metre, m."""
+    turn_per_sqrt_m_deg: float = 1.0
+    """Standard deviation of the heading after one metre straight on, degrees."""
+    turn_per_sqrt_rad_deg: float = 1.5
+    """Standard deviation of the heading after turning by one radian, degrees."""
+    lateral_per_sqrt_m: float = 0.01
+    """Standard deviation of the sideways slip after one metre, m."""
+
+    def __post_init__(self) -> None:
+        _check_positive(
+            self, "forward_per_sqrt_m", "turn_per_sqrt_m_deg", "turn_per_sqrt_rad_deg", "lateral_per_sqrt_m"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SlamConfig:
+    """The filter (eqs 23-31), its association, and the life of its landmarks."""
+
+    walls: bool = False
+    """Walls are landmarks too; off, corners only as in the paper's Table I."""
+    association: Association = "mutual"
+    """How an observation finds its landmark; "nearest" is the paper's."""
+    nearest_threshold: float = 0.5
+    """Threshold of the nearest-neighbour association, m."""
+    gate_probability: float = 0.99
+    """A true match passes the Mahalanobis gate with this probability."""
+    first_estimates: bool = True
+    """First-estimates Jacobians (Huang, Mourikis and Roumeliotis 2010) in place of the latest estimates'."""
+    sightings_to_birth: int = 3
+    """A landmark enters the map once it has been seen this often."""
+    max_false_negative_rate: float = 0.7
+    """A landmark whose false-negative rate f/(f+o) exceeds this is dropped ..."""
+    min_chances: int = 20
+    """... once it should have been seen this often."""
+    odometry_lag: float = 0.0
+    """The odometry that belongs to a scan is stamped this much earlier, s."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "nearest_threshold", "sightings_to_birth", "min_chances")
+        if not 0.0 < self.gate_probability < 1.0:
+            raise ConfigError(
+                f"SlamConfig.gate_probability must lie between 0 and 1, got {self.gate_probability!r}"
+            )
+        if self.association not in ("nearest", "mahalanobis", "mutual", "joint"):
+            raise ConfigError(
+                f"SlamConfig.association must be nearest, mahalanobis, mutual or joint, got {self.association!r}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """The whole pipeline from scan to map."""
+
+    detector: str = "matched_filter"
+    """Landmark detector, a key of ``contourslam.detectors.DETECTORS``."""
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+    contour: ContourConfig = field(default_factory=ContourConfig)
+    landmarks: LandmarkConfig = field(default_factory=LandmarkConfig)
+    slam: SlamConfig = field(default_factory=SlamConfig)

@@ -50,7 +50,9 @@ class LaserScan:
                 f"scan at stamp {self.stamp}: angles {self.angles.shape}, ranges {shape} and offsets "
                 f"{self.offsets.shape} must be vectors of one length"
             )
-        if not (np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()):
+        if not (
+            np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()
+        ):
             raise ScanError(f"scan at stamp {self.stamp}: a stamp, angle or time offset is not finite")
         if not 0.0 <= self.range_min < self.range_max:
             raise ScanError(

@@ -1,0 +1,1 @@
+"""Poses in the plane, angles and lines: pure mathematics, no robot in it."""

@@ -1,0 +1,95 @@
+"""What a run leaves behind: trajectory, map, consistency and timings, as plain arrays."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.slam.landmark_map import CornerMap, WallMap
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ScanUpdate:
+    """What one scan changed.
+
+    Attributes
+    ----------
+    stamp : float
+        Stamp of the scan, s; the pose is the one at this time.
+    pose : ndarray, shape (3,)
+        x (m), y (m), heading (rad) of the base in the world frame.
+    covariance : ndarray, shape (3, 3)
+        Its covariance.
+    corners, walls : int
+        How many were detected in the scan.
+    matched, missed, born, dropped : tuple of int
+        Ids of landmarks seen again, not seen though they should have been, new, and removed.
+    nis : float
+        Normalised innovation squared of the whole correction; 0 where nothing matched.
+    nis_dof : int
+        Its degrees of freedom.
+    """
+
+    stamp: float
+    pose: Floats
+    covariance: Floats
+    corners: int
+    walls: int
+    matched: tuple[int, ...]
+    missed: tuple[int, ...]
+    born: tuple[int, ...]
+    dropped: tuple[int, ...]
+    nis: float
+    nis_dof: int
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """A recording replayed through the filter; one row per scan.
+
+    Attributes
+    ----------
+    detector : str
+        Name of the landmark detector.
+    stamps : ndarray, shape (t,)
+        Stamps of the scans in the order of the recording, s; they may run backwards in a poor log.
+    poses : ndarray, shape (t, 3)
+        Estimated pose of the base in the world frame: x (m), y (m), heading (rad).
+    covariances : ndarray, shape (t, 3, 3)
+        Their covariance.
+    odometry : ndarray, shape (t, 3)
+        Raw odometry at the same times, moved so that it starts where the estimate starts.
+    truth : ndarray, shape (t, 3), or None
+        True poses at the same times, where the recording has them.
+    nis, nis_dof : ndarray, shape (t,)
+        Normalised innovation squared of each correction and its degrees of freedom.
+    matched_count, corner_count, wall_count : ndarray of int, shape (t,)
+        Landmarks matched, corners detected and walls detected per scan.
+    corner_map, wall_map
+        The final map.
+    seconds : dict of str to float
+        Time spent per stage (contour, detection, refinement, association, correction, ...), s.
+    skipped : dict of str to int
+        Scans and readings that could not be used, by reason.
+    complete : bool
+        False where the run was interrupted or the recording ended in an error; what was done before is kept.
+    """
+
+    detector: str
+    stamps: Floats
+    poses: Floats
+    covariances: Floats
+    odometry: Floats
+    truth: Floats | None
+    nis: Floats
+    nis_dof: NDArray[np.int64]
+    matched_count: NDArray[np.int64]
+    corner_count: NDArray[np.int64]
+    wall_count: NDArray[np.int64]
+    corner_map: CornerMap
+    wall_map: WallMap
+    seconds: dict[str, float] = field(default_factory=dict)
+    skipped: dict[str, int] = field(default_factory=dict)
+    complete: bool = True
