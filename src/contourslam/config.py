@@ -130,9 +130,7 @@ class SlamConfig:
     def __post_init__(self) -> None:
         _check_positive(self, "nearest_threshold", "sightings_to_birth", "min_chances")
         if not 0.0 < self.gate_probability < 1.0:
-            raise ConfigError(
-                f"SlamConfig.gate_probability must lie between 0 and 1, got {self.gate_probability!r}"
-            )
+            raise ConfigError(f"SlamConfig.gate_probability must lie between 0 and 1, got {self.gate_probability!r}")
         if self.association not in ("nearest", "mahalanobis", "mutual", "joint"):
             raise ConfigError(
                 f"SlamConfig.association must be nearest, mahalanobis, mutual or joint, got {self.association!r}"

@@ -47,9 +47,7 @@ def between(first: Floats, second: Floats) -> Floats:
     first, second = np.asarray(first), np.asarray(second)
     cos, sin = np.cos(first[..., 2]), np.sin(first[..., 2])
     dx, dy = second[..., 0] - first[..., 0], second[..., 1] - first[..., 1]
-    return np.stack(
-        [cos * dx + sin * dy, -sin * dx + cos * dy, wrap(second[..., 2] - first[..., 2])], axis=-1
-    )
+    return np.stack([cos * dx + sin * dy, -sin * dx + cos * dy, wrap(second[..., 2] - first[..., 2])], axis=-1)
 
 
 def inverse(pose: Floats) -> Floats:

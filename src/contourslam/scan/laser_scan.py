@@ -50,9 +50,7 @@ class LaserScan:
                 f"scan at stamp {self.stamp}: angles {self.angles.shape}, ranges {shape} and offsets "
                 f"{self.offsets.shape} must be vectors of one length"
             )
-        if not (
-            np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()
-        ):
+        if not (np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()):
             raise ScanError(f"scan at stamp {self.stamp}: a stamp, angle or time offset is not finite")
         if not 0.0 <= self.range_min < self.range_max:
             raise ScanError(
@@ -92,6 +90,4 @@ def evenly_spaced(
     """
     values = np.asarray(ranges, dtype=np.float64)
     index = np.arange(values.size, dtype=np.float64)
-    return LaserScan(
-        stamp, angle_min + angle_increment * index, values, time_increment * index, range_min, range_max
-    )
+    return LaserScan(stamp, angle_min + angle_increment * index, values, time_increment * index, range_min, range_max)

@@ -26,9 +26,7 @@ class Odometry:
     def __post_init__(self) -> None:
         pose = np.array(self.pose, dtype=np.float64)
         if pose.shape != (3,) or not np.isfinite(pose).all() or not np.isfinite(self.stamp):
-            raise ScanError(
-                f"odometry at stamp {self.stamp}: pose must be three finite numbers, got {self.pose!r}"
-            )
+            raise ScanError(f"odometry at stamp {self.stamp}: pose must be three finite numbers, got {self.pose!r}")
         pose.flags.writeable = False
         object.__setattr__(self, "pose", pose)
 
