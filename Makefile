@@ -1,0 +1,48 @@
+# Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
+.DEFAULT_GOAL := help
+.PHONY: help demo test bench check clean
+.DELETE_ON_ERROR:
+
+VENV := .venv
+BIN := $(VENV)/bin
+# The first interpreter that is new enough; `make PYTHON=/path/to/python3.12 demo` chooses another.
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
+	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
+
+help: ## List the targets.
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, write the report to demo/ (minutes).
+	$(BIN)/contourslam compare --room furnished_room --seeds 3 --jobs 2 --output demo --overwrite
+	$(BIN)/contourslam run demo/recordings/furnished_room-0.mcap --output demo/run --overwrite
+	@echo "Open demo/index.html in a browser; demo/run holds the map of the first recording."
+
+test: $(VENV)/.dev ## Run the tests.
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.dev ## Lint, check the format and the types.
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+bench: $(VENV)/.dev ## Measure speed, size and accuracy on real logs; rewrite the tables of BENCHMARK.md.
+	$(BIN)/python benchmarks/run_all.py
+
+clean: ## Remove everything that the other targets made, .venv included.
+	rm -rf $(VENV) demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or give it: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@"$(PYTHON)" -m venv $(VENV) || { rm -rf $(VENV); echo "$(PYTHON) cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+
+$(VENV)/.all: pyproject.toml | $(BIN)/python
+	@echo "Installing contourslam and its libraries into $(VENV), about a minute ..."
+	@$(PIP_INSTALL) '.[all]'
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml | $(BIN)/python
+	@echo "Installing contourslam, its libraries and the developer's tools into $(VENV), about a minute ..."
+	@$(PIP_INSTALL) '.[dev]'
+	@touch $(VENV)/.all $@
