@@ -48,8 +48,16 @@ class ContourConfig:
     """Range noise allowed for in the breakpoint distance, in standard deviations."""
     max_gap: float = 1.0
     """Two neighbouring points farther apart than this, m, are never one contour."""
+    max_missing: int = 2
+    """A contour goes on over this many beams without a return, if the gap is short enough."""
     min_points: int = 4
     """A contour of fewer points is dropped, mixed pixels among them."""
+    average_sigmas: float = 3.0
+    """Points closer than this many standard deviations of the range are averaged before the equalization; 0 for none."""
+    spacing: float = 0.05
+    """Least length of the equalized contour's elementary vectors, m."""
+    spacing_sigmas: float = 6.0
+    """Least length of these vectors in standard deviations of the range."""
 
     def __post_init__(self) -> None:
         _check_positive(self, "breakpoint_angle_deg", "breakpoint_sigmas", "max_gap", "min_points")
@@ -143,6 +151,8 @@ class Config:
 
     detector: str = "matched_filter"
     """Landmark detector, a key of ``contourslam.detectors.DETECTORS``."""
+    adapted: bool = True
+    """Use the detector's adaptations to range noise; off, as its source has it."""
     lidar: LidarConfig = field(default_factory=LidarConfig)
     contour: ContourConfig = field(default_factory=ContourConfig)
     landmarks: LandmarkConfig = field(default_factory=LandmarkConfig)

@@ -1,0 +1,40 @@
+"""The contours of one scan: chains of points, each chain the trace of one surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Contours:
+    """Contours in one flat array, counter-clockwise as the lidar sees them: free space lies to the left.
+
+    Attributes
+    ----------
+    points : ndarray, shape (m, 2)
+        Points in the lidar's frame at the scan's stamp, m.
+    starts : ndarray of int, shape (c + 1,)
+        Contour i is ``points[starts[i]:starts[i + 1]]``.
+    closed : ndarray of bool, shape (c,)
+        True where the last point is followed by the first, as in a full turn without a break.
+    spacing : float
+        Length of the elementary vectors in m, about equal after the equalization; 0 for raw contours.
+    source : ndarray, shape (m,)
+        Index of each point among the raw contours' points; fractions lie between two of them.
+    """
+
+    points: Floats
+    starts: Ints
+    closed: NDArray[np.bool_]
+    spacing: float
+    source: Floats
+
+    def __len__(self) -> int:
+        return len(self.closed)
+
+    def __getitem__(self, index: int) -> Floats:
+        return self.points[self.starts[index] : self.starts[index + 1]]

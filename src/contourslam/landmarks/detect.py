@@ -1,0 +1,121 @@
+"""From a scan to its landmarks: the left half of the pipeline in one function a stage."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour import Contours, equalize, segment
+from contourslam.contour.contours import Floats, Ints
+from contourslam.detectors import Detector, suppress
+from contourslam.landmarks.corner import Corners, refine_corners
+from contourslam.landmarks.wall import Walls, extract_walls
+from contourslam.scan import LaserScan
+from contourslam.scan.deskew import deskew
+from contourslam.scan.validity import valid_beams
+
+NO_MOTION = (np.empty(0), np.empty((0, 3)))
+Lap = Callable[[str], None]
+
+
+def _no_lap(stage: str) -> None:
+    """Nobody measures."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Everything seen in one scan, in the lidar's frame at its stamp.
+
+    Attributes
+    ----------
+    contours : Contours
+        Raw contours.
+    curve : Contours
+        The contours as the detector saw them: equalized, or the raw ones.
+    response : ndarray, shape (m,)
+        The detector's response at each point of `curve`.
+    candidates : ndarray of int, shape (k,)
+        Points of `curve` that survived the suppression.
+    corners : Corners
+    walls : Walls
+    """
+
+    contours: Contours
+    curve: Contours
+    response: Floats
+    candidates: Ints
+    corners: Corners
+    walls: Walls
+
+
+def trace(
+    scan: LaserScan, config: Config, motion: tuple[Floats, Floats] = NO_MOTION, T_base_lidar: Floats | None = None
+) -> Contours:
+    """Contours of a scan: valid beams, motion undone, cut where the surface changes (eq. 1).
+
+    Parameters
+    ----------
+    scan : LaserScan
+    config : Config
+    motion : (ndarray of shape (k,), ndarray of shape (k, 3))
+        Times after the scan's stamp, s, and base poses of the odometry there; see :func:`contourslam.scan.deskew`.
+    T_base_lidar : ndarray, shape (3,), optional
+        Mounting of the lidar; that of the configuration by default.
+
+    Returns
+    -------
+    Contours
+    """
+    lidar = config.lidar
+    mount = np.array([lidar.mount_x, lidar.mount_y, lidar.mount_yaw]) if T_base_lidar is None else T_base_lidar
+    points, beams = deskew(scan, valid_beams(scan, lidar.max_range), *motion, mount)
+    return segment(points, scan.angles[beams], beams, scan.ranges.size, lidar.sigma_range, config.contour)
+
+
+def find_landmarks(contours: Contours, detector: Detector, config: Config, lap: Lap = _no_lap) -> Detection:
+    """Corners and walls of the contours: response, suppression, refinement; walls only if the filter uses them.
+
+    Parameters
+    ----------
+    contours : Contours
+        Raw contours.
+    detector : Detector
+    config : Config
+    lap : callable, optional
+        Called with the name of each stage when it is done, for those who measure time.
+
+    Returns
+    -------
+    Detection
+    """
+    sigma = config.lidar.sigma_range
+    curve = contours
+    if detector.equalized:
+        spacing = max(config.contour.spacing, config.contour.spacing_sigmas * sigma)
+        curve = equalize(contours, spacing, average_below=config.contour.average_sigmas * sigma)
+        lap("equalization")
+    response = detector.respond(curve)
+    candidates = suppress(response, curve, detector.threshold, detector.reach(curve))
+    lap("detection")
+    corners = refine_corners(contours, curve.source[candidates], sigma, config.landmarks)
+    lap("refinement")
+    walls = extract_walls(contours, sigma, config.landmarks)
+    lap("walls")
+    return Detection(contours, curve, response, candidates, corners, walls)
+
+
+def detect(scan: LaserScan, detector: Detector, config: Config) -> Detection:
+    """Landmarks of a single scan, taken as if the robot stood still.
+
+    Parameters
+    ----------
+    scan : LaserScan
+    detector : Detector
+    config : Config
+
+    Returns
+    -------
+    Detection
+    """
+    return find_landmarks(trace(scan, config), detector, config)
