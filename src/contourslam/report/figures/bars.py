@@ -1,0 +1,162 @@
+"""Bars and lines that set the detectors side by side: error, noise, refinement, timings."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from contourslam.report.figures.style import BLUE, FAINT, GREY, ORANGE, colour, label, logarithmic, styled
+
+Floats = NDArray[np.float64]
+
+_STAGES = ("#0072b2", "#56b4e9", "#009e73", "#f0e442", "#e69f00", "#d55e00", "#aa4499", "#999999")
+
+
+@styled
+def rmse_figure(
+    rmse: Mapping[str, tuple[float, float]], paper: Mapping[str, float], *, odometry: float, bound: float | None = None
+) -> Figure:
+    """Draw each detector's position error beside the paper's, on a logarithmic scale.
+
+    Parameters
+    ----------
+    rmse : mapping of str to (float, float)
+        Mean and standard deviation over the seeds of the position RMSE, per detector, m.
+    paper : mapping of str to float
+        The paper's, where it has one, m.
+    odometry : float
+        Raw odometry's, m.
+    bound : float, optional
+        The Cramér-Rao bound of a scan in the known room, m.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = Figure(figsize=(6.0, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    names = list(rmse)
+    place = np.arange(len(names))
+    means, spreads = 100.0 * np.array([rmse[name] for name in names]).reshape(-1, 2).T
+    theirs = 100.0 * np.array([paper.get(name, np.nan) for name in names])
+    axes.barh(place - 0.19, means, 0.36, color=[colour(name) for name in names], label="this run")
+    whiskers = np.stack([np.minimum(spreads, 0.9 * means), spreads])  # a bar on a log axis cannot reach zero
+    axes.errorbar(means, place - 0.19, xerr=whiskers, fmt="none", ecolor="#222222", elinewidth=1.0, capsize=2.5)
+    axes.barh(place + 0.19, theirs, 0.36, color=FAINT, label="paper")
+    for y, value in [*zip(place - 0.19, means, strict=True), *zip(place + 0.19, theirs, strict=True)]:
+        if np.isfinite(value):
+            axes.annotate(f"{value:.1f}", (value, y), (9, 0), textcoords="offset points", va="center", fontsize=8.5)
+    axes.axvline(100.0 * odometry, color=ORANGE, linestyle="--", label="raw odometry")
+    if bound is not None:
+        axes.axvline(100.0 * bound, color=GREY, linestyle=":", label="Cramér-Rao bound")
+    logarithmic(axes, "x")
+    axes.set_yticks(place, [label(name) for name in names])
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("RMSE of the position (cm)")
+    figure.legend(loc="outside lower left", ncols=4)
+    return figure
+
+
+@styled
+def noise_figure(levels: Floats, rmse: Mapping[str, Floats], *, odometry: float | None = None) -> Figure:
+    """Draw position and heading error against the lidar's range noise.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (n,)
+        Standard deviation of the range noise, m.
+    rmse : mapping of str to ndarray, shape (n, 3)
+        RMSE of x (m), y (m) and heading (rad) at each level, per detector.
+    odometry : float, optional
+        Raw odometry's position RMSE, m.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = Figure(figsize=(6.0, 5.0), layout="constrained")
+    position, heading = figure.subplots(2, 1, sharex=True)
+    for name, errors in rmse.items():
+        style = {"color": colour(name), "marker": "o", "markersize": 4}
+        position.plot(100.0 * levels, 100.0 * np.hypot(errors[:, 0], errors[:, 1]), label=label(name), **style)
+        heading.plot(100.0 * levels, np.degrees(errors[:, 2]), **style)
+    if odometry is not None:
+        position.axhline(100.0 * odometry, color=ORANGE, linestyle="--", label="raw odometry")
+    for axes, name in ((position, "position RMSE (cm)"), (heading, "heading RMSE (°)")):
+        logarithmic(axes, "y")
+        axes.set_ylabel(name)
+    heading.set_xlabel("standard deviation of the range noise (cm)")
+    figure.legend(loc="outside lower left", ncols=3)
+    return figure
+
+
+@styled
+def pair_figure(
+    first: Mapping[str, float], second: Mapping[str, float], *, names: tuple[str, str], ylabel: str, scale: float = 1.0
+) -> Figure:
+    """Draw two bars per detector, such as the error with raw and with refined corners.
+
+    Parameters
+    ----------
+    first, second : mapping of str to float
+        The two values of each detector.
+    names : tuple of str
+        What the two are.
+    ylabel : str
+        Axis label, with the unit after `scale`.
+    scale : float
+        Values are multiplied by this.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = Figure(figsize=(6.0, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    place = np.arange(len(first))
+    for values, name, shift, fill in ((first, names[0], -0.2, FAINT), (second, names[1], 0.2, BLUE)):
+        bars = axes.bar(place + shift, [scale * values[key] for key in first], 0.38, color=fill, label=name)
+        axes.bar_label(bars, fmt="%.2g", fontsize=8.5, padding=2)
+    axes.set_xticks(place, [label(key) for key in first])
+    axes.grid(visible=False, axis="x")
+    axes.set_ylabel(ylabel)
+    axes.margins(y=0.12)
+    figure.legend(loc="outside upper left", ncols=2)
+    return figure
+
+
+@styled
+def timing_figure(stages: Mapping[str, Mapping[str, float]], order: Sequence[str] = ()) -> Figure:
+    """Draw the time a scan takes, stage by stage.
+
+    Parameters
+    ----------
+    stages : mapping of str to mapping of str to float
+        Time per scan of each stage, per detector, s.
+    order : sequence of str
+        Stages from left to right; others follow.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = Figure(figsize=(6.0, 3.0), layout="constrained")
+    axes = figure.add_subplot()
+    names = list(stages)
+    known = list(dict.fromkeys([*order, *(stage for one in stages.values() for stage in one)]))
+    place, left = np.arange(len(names)), np.zeros(len(names))
+    for i, stage in enumerate(known):
+        width = 1e3 * np.array([stages[name].get(stage, 0.0) for name in names])
+        axes.barh(place, width, 0.62, left=left, color=_STAGES[i % len(_STAGES)], label=stage)
+        left += width
+    for y, total in zip(place, left, strict=True):
+        axes.annotate(f"{total:.2f}", (total, y), (4, 0), textcoords="offset points", va="center", fontsize=8.5)
+    axes.set_yticks(place, [label(name) for name in names])
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.margins(x=0.12)
+    axes.set_xlabel("time per scan on one core (ms)")
+    figure.legend(loc="outside lower left", ncols=4)
+    return figure

@@ -1,0 +1,167 @@
+"""The folder a run leaves behind: trajectory, map, metrics and the configuration that was really used."""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contourslam import __version__
+from contourslam.config import Config
+from contourslam.errors import MissingExtraError, ResultError
+from contourslam.recordings.trajectories import write_tum
+from contourslam.report.atomic import replacing, write_text
+from contourslam.report.config_file import read_config, write_config
+from contourslam.report.map_files import write_geojson
+from contourslam.report.map_reader import read_geojson
+from contourslam.report.nav2_map import write_nav2_map
+from contourslam.report.occupancy import OccupancyGrid
+from contourslam.report.scan_table import read_scan_table, write_scan_table
+from contourslam.slam.result import RunResult
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRun:
+    """A result folder, read back.
+
+    Attributes
+    ----------
+    result : RunResult
+        The run; its map's positions are rounded to 0.1 mm.
+    config : Config
+        The configuration it really used.
+    metrics : dict
+        ``metrics.json`` as it stands.
+    """
+
+    result: RunResult
+    config: Config
+    metrics: dict[str, Any]
+
+
+def to_json(values: dict[str, Any]) -> str:
+    """Give a dictionary as JSON; a number that is not finite becomes null, which JSON can hold."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {str(key): plain(entry) for key, entry in value.items()}
+        if isinstance(value, np.ndarray | np.generic):
+            return plain(value.tolist())
+        if isinstance(value, list | tuple):
+            return [plain(entry) for entry in value]
+        return None if isinstance(value, float) and not np.isfinite(value) else value
+
+    return json.dumps(plain(values), indent=2, allow_nan=False) + "\n"
+
+
+def write_result_folder(
+    folder: Path,
+    result: RunResult,
+    config: Config,
+    metrics: dict[str, Any],
+    *,
+    grid: OccupancyGrid | None = None,
+    command: str = "",
+) -> tuple[str, ...]:
+    """Write what a run leaves behind; files of the same names are replaced, others are left alone.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where needed.
+    result : RunResult
+        The run, complete or not.
+    config : Config
+        The configuration it really used.
+    metrics : dict
+        What was measured; run, detector, timings and completeness are added to it.
+    grid : OccupancyGrid, optional
+        Written as ``map.pgm`` and ``map.yaml`` where given.
+    command : str
+        The command line, kept with the configuration.
+
+    Returns
+    -------
+    tuple of str
+        What could not be done without harm to the rest, such as the picture where matplotlib is not installed.
+
+    Raises
+    ------
+    ResultError
+        If a file cannot be written.
+    """
+    with replacing(folder / "trajectory.tum") as path:
+        write_tum(path, result.stamps, result.poses)
+    write_scan_table(folder / "scans.csv", result)
+    write_geojson(folder / "map.geojson", result.corner_map, result.wall_map)
+    write_config(folder / "config.yaml", config, header=f"contourslam {__version__}\n{command}".strip())
+    if grid is not None:
+        write_nav2_map(folder, grid)
+    run = {
+        "contourslam": __version__,
+        "command": command,
+        "complete": result.complete,
+        "detector": result.detector,
+        "scans": len(result.stamps),
+        "corners": len(result.corner_map.ids),
+        "walls": len(result.wall_map.ids),
+        "seconds": result.seconds,
+        "skipped": result.skipped,
+    }
+    write_text(folder / "metrics.json", to_json({**run, **metrics}))
+    try:
+        from contourslam.report.figures.save import save_figure
+        from contourslam.report.figures.world import world_figure
+    except MissingExtraError as error:
+        return (f"map.png is left out: {error}",)
+    save_figure(world_figure(result, grid=grid), folder / "map.png")
+    return ()
+
+
+def read_result_folder(folder: Path) -> StoredRun:
+    """Read a folder written by :func:`write_result_folder`.
+
+    Raises
+    ------
+    ResultError
+        If a file is missing or damaged; the message names it.
+    ConfigError
+        If ``config.yaml`` is.
+    """
+    if not folder.is_dir():
+        raise ResultError(
+            f"{folder}: there is no such result folder; `contourslam run RECORDING -o {folder}` writes one"
+        )
+    metrics = read_metrics(folder / "metrics.json")
+    corners, walls = read_geojson(folder / "map.geojson")
+    result = dataclasses.replace(
+        read_scan_table(folder / "scans.csv"),
+        detector=str(metrics.get("detector", "")),
+        corner_map=corners,
+        wall_map=walls,
+        seconds=dict(metrics.get("seconds") or {}),
+        skipped=dict(metrics.get("skipped") or {}),
+        complete=metrics.get("complete") is True,
+    )
+    return StoredRun(result, read_config(folder / "config.yaml"), metrics)
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Read a ``metrics.json``.
+
+    Raises
+    ------
+    ResultError
+        If the file is missing or is not a JSON object.
+    """
+    try:
+        metrics = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, RecursionError) as error:
+        raise ResultError(f"{path}: is not valid JSON ({error})") from error
+    if not isinstance(metrics, dict):
+        raise ResultError(f"{path}: must hold a JSON object of metrics")
+    return metrics

@@ -1,0 +1,94 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from contourslam.geometry.poses import between, compose
+from contourslam.scan import LaserScan, evenly_spaced
+from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.result import RunResult
+
+ROOM = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
+
+
+def square_map(rng: np.random.Generator) -> tuple[CornerMap, WallMap]:
+    n = len(ROOM)
+    factor = 0.006 * rng.standard_normal((n, 2, 2))
+    corners = CornerMap(
+        ids=np.array([3, 5, 8, 13]),
+        positions=ROOM + 0.005 * rng.standard_normal((n, 2)),
+        covariances=factor @ factor.transpose(0, 2, 1) + 1e-6 * np.eye(2),
+        directions=np.array([0.785398, 2.356194, -2.356194, -0.785398]),
+        openings=np.full(n, 1.5707963),
+        convex=np.array([False, True, False, False]),
+        observed=np.array([800, 640, 90, 700]),
+        failed=np.array([10, 40, 60, 25]),
+    )
+    walls = WallMap(
+        ids=np.array([1, 2, 4, 6]),
+        end_points=np.stack([ROOM, np.roll(ROOM, -1, axis=0)], axis=1),
+        end_point_covariances=np.broadcast_to(1e-5 * np.eye(2), (n, 2, 2, 2)).copy(),
+        normals=np.array([-1.570796, 0.0, 1.570796, 3.1415926]),
+        line_covariances=np.broadcast_to(np.diag([1e-6, 1e-5]), (n, 2, 2)).copy(),
+        observed=np.array([900, 910, 870, 901]),
+        failed=np.array([3, 4, 0, 9]),
+    )
+    return corners, walls
+
+
+@pytest.fixture
+def make_run() -> Callable[..., RunResult]:
+    """A run through a 6 m by 4 m room whose errors are as large as its covariance says."""
+
+    def make(detector: str = "matched_filter", seed: int = 0, scans: int = 300, complete: bool = True) -> RunResult:
+        rng = np.random.default_rng(seed)
+        turn = np.linspace(0.0, 4.0 * np.pi, scans)
+        truth = np.stack(
+            [3.0 + 2.0 * np.sin(turn), 2.0 - 1.2 * np.cos(turn), np.arctan2(1.2 * np.sin(turn), 2.0 * np.cos(turn))],
+            axis=-1,
+        )
+        sigma = np.array([0.008, 0.006, 0.002])
+        steps = between(truth[:-1], truth[1:]) * np.array([1.01, 1.0, 1.012])
+        odometry = [truth[0]]
+        for step in steps:
+            odometry.append(compose(odometry[-1], step))
+        corners, walls = square_map(rng)
+        return RunResult(
+            detector=detector,
+            stamps=100.0 + 0.1 * np.arange(scans),
+            poses=truth + sigma * rng.standard_normal((scans, 3)),
+            covariances=np.broadcast_to(np.diag(sigma**2), (scans, 3, 3)).copy(),
+            odometry=np.array(odometry),
+            truth=truth,
+            nis=rng.chisquare(4, scans),
+            nis_dof=np.full(scans, 4),
+            matched_count=np.full(scans, 2),
+            corner_count=np.full(scans, 3),
+            wall_count=np.full(scans, 4),
+            corner_map=corners,
+            wall_map=walls,
+            seconds={"contour": 0.02 * scans / 300, "detection": 0.05, "refinement": 0.02, "correction": 0.04},
+            skipped={},
+            complete=complete,
+        )
+
+    return make
+
+
+@pytest.fixture
+def room_scan() -> Callable[..., LaserScan]:
+    """A noiseless scan of the 6 m by 4 m room from a pose inside it."""
+
+    def scan(pose: np.ndarray, stamp: float = 0.0, beams: int = 360) -> LaserScan:
+        angles = 2.0 * np.pi * np.arange(beams) / beams
+        direction = np.stack([np.cos(angles + pose[2]), np.sin(angles + pose[2])], axis=-1)
+        with np.errstate(divide="ignore"):
+            to_walls = np.stack(
+                [(np.where(direction[:, i] >= 0, ROOM[2, i], 0.0) - pose[i]) / direction[:, i] for i in (0, 1)]
+            )
+        ranges = to_walls.min(axis=0)
+        return evenly_spaced(
+            stamp, ranges, angle_min=0.0, angle_increment=2.0 * np.pi / beams, range_min=0.05, range_max=20.0
+        )
+
+    return scan
