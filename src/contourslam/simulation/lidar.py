@@ -1,0 +1,118 @@
+"""The simulated lidar: every beam is cast from where the lidar is at that beam's own time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.simulation.chance import TURN_RATE, stream
+from contourslam.simulation.config import LidarModel
+from contourslam.simulation.drive import Drive, Progress
+from contourslam.simulation.mjcf import import_mujoco
+from contourslam.simulation.room import Room
+from contourslam.simulation.world import compile_world
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class IdealScan:
+    """One turn without noise.
+
+    Attributes
+    ----------
+    stamp : float
+        Time of the first beam, s.
+    angles, offsets : ndarray, shape (n,)
+        Direction of each beam in the lidar's frame, rad, and its time after the stamp, s.
+    ranges : ndarray, shape (n,)
+        Distance to what the beam meets, m; inf where it meets nothing.
+    incidences : ndarray, shape (n,)
+        Angle between the beam and the surface it meets, rad in [0, pi/2].
+    """
+
+    stamp: float
+    angles: Floats
+    offsets: Floats
+    ranges: Floats
+    incidences: Floats
+
+
+def cast_scans(
+    room: Room, drive: Drive, lidar: LidarModel, seed: int, *, progress: Progress | None = None
+) -> tuple[IdealScan, ...]:
+    """Cast all complete turns of a drive: the expensive half; :func:`~contourslam.simulation.noise.add_noise` is cheap.
+
+    Parameters
+    ----------
+    room : Room
+    drive : Drive
+        Driven in that room.
+    lidar : LidarModel
+    seed : int
+        Varies the turn rate, where it wobbles.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    tuple of IdealScan
+
+    Raises
+    ------
+    MissingExtraError
+        If MuJoCo is not installed.
+    """
+    mujoco = import_mujoco()
+    model = compile_world(room)  # without the robot: the lidar stands above it and never sees it
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    chance, end, first, wobble = stream(seed, TURN_RATE), drive.times[-1], 0, 0.0
+    scans: list[IdealScan] = []
+    while True:
+        wobble = 0.9 * wobble + np.sqrt(1 - 0.9**2) * lidar.turn_rate_wobble * chance.standard_normal()
+        rate = lidar.turn_rate + wobble
+        if lidar.turn_rate_wobble > 0:
+            rate = float(np.clip(rate, *lidar.turn_rate_limits))
+        beams = round(lidar.samples_per_second / rate)
+        stamp = round(first / lidar.samples_per_second, 9)
+        offsets = np.arange(beams) / lidar.samples_per_second
+        if stamp + offsets[-1] > end:
+            return tuple(scans)
+        angles = -np.pi + 2 * np.pi / beams * np.arange(beams)
+        if lidar.clockwise:
+            angles = -angles
+        origins, directions = _beams(drive, lidar, stamp + offsets, angles)
+        ranges, incidences = _cast(mujoco, model, data, origins, directions)
+        scans.append(IdealScan(stamp, angles, offsets, ranges, incidences))
+        first += beams
+        if progress is not None:
+            progress(min(stamp / end, 1.0))
+
+
+def _beams(drive: Drive, lidar: LidarModel, times: Floats, angles: Floats) -> tuple[Floats, Floats]:
+    """Origin (m) and unit direction of each beam in the world frame, each shape (n, 3), between physics steps."""
+    spacing = drive.times[1] - drive.times[0]
+    index = np.minimum((times / spacing).astype(np.int64), len(drive.times) - 2)
+    weight = (times / spacing - index)[:, None]
+    position = (1 - weight) * drive.positions[index] + weight * drive.positions[index + 1]
+    axes = (1 - weight[:, None]) * drive.rotations[index] + weight[:, None] * drive.rotations[index + 1]
+    mount = np.array([lidar.mount_x, 0.0, lidar.mount_height - drive.positions[0, 2]])
+    directions = np.cos(angles)[:, None] * axes[:, :, 0] + np.sin(angles)[:, None] * axes[:, :, 1]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return position + axes @ mount, directions
+
+
+def _cast(mujoco: Any, model: Any, data: Any, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
+    """Range (m) and incidence (rad) of each beam."""
+    # One call a beam: casting many at once (mj_multiRay) would make all of them start at one point.
+    ray, count = mujoco.mj_ray, len(origins)
+    normals = np.zeros((count, 3))
+    found = [
+        ray(model, data, origin, direction, None, 1, -1, None, normal)
+        for origin, direction, normal in zip(origins, directions, normals, strict=True)
+    ]
+    ranges = np.array(found)
+    incidences = np.arcsin(np.clip(np.abs(np.einsum("ij,ij->i", normals, directions)), 0.0, 1.0))
+    return np.where(ranges < 0, np.inf, ranges), incidences
