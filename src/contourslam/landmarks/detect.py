@@ -16,6 +16,7 @@ from contourslam.scan.deskew import deskew
 from contourslam.scan.validity import valid_beams
 
 NO_MOTION = (np.empty(0), np.empty((0, 3)))
+NO_WALLS = Walls(np.empty((0, 2, 2)), np.empty((0, 2)), np.empty((0, 2, 2)), np.empty((0, 2, 2, 2)))
 Lap = Callable[[str], None]
 
 
@@ -73,8 +74,10 @@ def trace(
     return segment(points, scan.angles[beams], beams, scan.ranges.size, lidar.sigma_range, config.contour)
 
 
-def find_landmarks(contours: Contours, detector: Detector, config: Config, lap: Lap = _no_lap) -> Detection:
-    """Corners and walls of the contours: response, suppression, refinement; walls only if the filter uses them.
+def find_landmarks(
+    contours: Contours, detector: Detector, config: Config, lap: Lap = _no_lap, *, walls: bool = True
+) -> Detection:
+    """Corners and walls of the contours: response, suppression, refinement.
 
     Parameters
     ----------
@@ -84,6 +87,8 @@ def find_landmarks(contours: Contours, detector: Detector, config: Config, lap: 
     config : Config
     lap : callable, optional
         Called with the name of each stage when it is done, for those who measure time.
+    walls : bool
+        Extract walls too.
 
     Returns
     -------
@@ -100,9 +105,9 @@ def find_landmarks(contours: Contours, detector: Detector, config: Config, lap: 
     lap("detection")
     corners = refine_corners(contours, curve.source[candidates], sigma, config.landmarks)
     lap("refinement")
-    walls = extract_walls(contours, sigma, config.landmarks)
+    segments = extract_walls(contours, sigma, config.landmarks) if walls else NO_WALLS
     lap("walls")
-    return Detection(contours, curve, response, candidates, corners, walls)
+    return Detection(contours, curve, response, candidates, corners, segments)
 
 
 def detect(scan: LaserScan, detector: Detector, config: Config) -> Detection:

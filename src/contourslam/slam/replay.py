@@ -1,0 +1,165 @@
+"""A recording, message by message, through the streaming object."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from time import perf_counter
+
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour.contours import Floats
+from contourslam.detectors import Detector
+from contourslam.errors import RecordingError
+from contourslam.geometry.poses import between, compose, interpolate
+from contourslam.scan import LaserScan, Odometry, TruePose
+from contourslam.slam.result import RunResult, ScanUpdate
+from contourslam.slam.slam import ContourSlam
+
+Message = LaserScan | Odometry | TruePose
+
+
+class Stopwatch:
+    """Seconds per stage; the clock that the core itself does not read."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = perf_counter()
+
+    def start(self) -> None:
+        """Begin to measure the next stage here."""
+        self._last = perf_counter()
+
+    def __call__(self, stage: str) -> None:
+        """Book the time since the last call under `stage`."""
+        now = perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        self._last = now
+
+
+def replay(
+    messages: Iterable[Message],
+    config: Config,
+    detector: Detector | None = None,
+    *,
+    initial_pose: Floats | None = None,
+    lidar_mount: Floats | tuple[float, float, float] | None = None,
+    on_scan: Callable[[LaserScan, ScanUpdate], None] | None = None,
+) -> RunResult:
+    """Run the filter over the messages of a recording.
+
+    Where the recording breaks off in an error, or Ctrl-C ends the run, the result of what came before is returned,
+    marked as not complete; `skipped` then says why.
+
+    Parameters
+    ----------
+    messages : iterable of LaserScan, Odometry or TruePose
+        In the order in which they were recorded.
+    config : Config
+    detector : Detector, optional
+        A detector object of one's own in place of the configuration's.
+    initial_pose : ndarray, shape (3,), optional
+        Pose of the base in the world at the first scan; by default the true one where the recording has it, else the
+        origin.
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    on_scan : callable, optional
+        Called after each scan, for progress and pictures.
+
+    Returns
+    -------
+    RunResult
+
+    Raises
+    ------
+    RecordingError
+        If the recording fails before its first scan.
+    """
+    watch = Stopwatch()
+    slam: ContourSlam | None = None
+    updates: list[ScanUpdate] = []
+    odometry: list[Floats] = []
+    truth: list[TruePose] = []
+    skipped: Counter[str] = Counter()
+    mount = None if lidar_mount is None else np.asarray(lidar_mount, dtype=np.float64)
+    waiting: list[Odometry] = []
+    newest: Odometry | None = None
+    complete = True
+    try:
+        for message in messages:
+            if isinstance(message, TruePose):
+                truth.append(message)
+                continue
+            if isinstance(message, Odometry):
+                newest = message
+                waiting.append(message)
+                continue
+            if slam is None:
+                start = initial_pose
+                if start is None and truth:
+                    start = _pose_at(truth, np.array([message.stamp]))[0]
+                slam = ContourSlam(config, detector, initial_pose=start, lidar_mount=mount, lap=watch)
+            for reading in waiting:
+                slam.push_odometry(reading)
+            waiting.clear()
+            if newest is None:
+                skipped["scans before the first odometry"] += 1
+            watch.start()
+            update = slam.push_scan(message)
+            updates.append(update)
+            odometry.append(slam.odometry_pose)
+            if on_scan is not None:
+                on_scan(message, update)
+    except KeyboardInterrupt:
+        complete = False
+        skipped["interrupted"] += 1
+    except RecordingError as error:
+        if not updates:
+            raise
+        complete = False
+        skipped[str(error)] += 1
+    if slam is None:
+        if complete:
+            raise RecordingError("the recording holds no scan")
+        slam = ContourSlam(config, detector, initial_pose=initial_pose, lidar_mount=mount)
+    return _result(config, slam, updates, odometry, truth, watch, dict(skipped), complete)
+
+
+def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
+    rows = sorted(truth, key=lambda t: t.stamp)
+    return interpolate(np.array([t.stamp for t in rows]), np.array([t.pose for t in rows]), stamps)
+
+
+def _result(
+    config: Config,
+    slam: ContourSlam,
+    updates: list[ScanUpdate],
+    odometry: list[Floats],
+    truth: list[TruePose],
+    watch: Stopwatch,
+    skipped: dict[str, int],
+    complete: bool,
+) -> RunResult:
+    stamps = np.array([u.stamp for u in updates])
+    poses = np.array([u.pose for u in updates]).reshape(-1, 3)
+    raw = np.array(odometry).reshape(-1, 3)
+    if len(raw):
+        raw = compose(slam.start_pose, between(raw[0], raw))
+    counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64).reshape(-1, 4)
+    return RunResult(
+        detector=config.detector,
+        stamps=stamps,
+        poses=poses,
+        covariances=np.array([u.covariance for u in updates]).reshape(-1, 3, 3),
+        odometry=raw,
+        truth=_pose_at(truth, stamps) if truth and len(stamps) else None,
+        nis=np.array([u.nis for u in updates]),
+        nis_dof=counts[:, 3],
+        matched_count=counts[:, 0],
+        corner_count=counts[:, 1],
+        wall_count=counts[:, 2],
+        corner_map=slam.corner_map(),
+        wall_map=slam.wall_map(),
+        seconds=watch.seconds,
+        skipped=skipped,
+        complete=complete,
+    )

@@ -1,0 +1,184 @@
+"""The streaming object: odometry and scans go in, poses and a map of corners and walls come out."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour.contours import Floats, Ints
+from contourslam.detectors import Detector, make_detector
+from contourslam.geometry.poses import between, compose
+from contourslam.landmarks import find_landmarks, trace
+from contourslam.scan import LaserScan, Odometry
+from contourslam.slam import ekf
+from contourslam.slam.association import Model, associate
+from contourslam.slam.landmark_filter import LandmarkFilter
+from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twins
+from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.measurement import predict_measurements
+from contourslam.slam.motion import motion_noise, predict
+from contourslam.slam.observation import observe, to_world
+from contourslam.slam.odometry_buffer import OdometryBuffer
+from contourslam.slam.result import ScanUpdate
+from contourslam.slam.visibility import expected_in_scan
+
+
+def _no_lap(stage: str) -> None:
+    """Nobody measures."""
+
+
+class ContourSlam:
+    """EKF-SLAM over the corners and walls of a 2-D lidar (eqs 23-31).
+
+    Parameters
+    ----------
+    config : Config
+    detector : Detector, optional
+        A detector object of one's own; by default the one that the configuration names.
+    initial_pose : ndarray, shape (3,), optional
+        x (m), y (m), heading (rad) of the base in the world where it starts; the origin by default.
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    lap : callable, optional
+        Called with the name of each stage when it is done, for those who measure time; the core reads no clock.
+
+    Attributes
+    ----------
+    filter : LandmarkFilter
+        The state, changed in place by every scan.
+    mount, start_pose : ndarray, shape (3,)
+        ``T_base_lidar``, and the pose of the base where it started.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration names a detector that does not exist.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        detector: Detector | None = None,
+        *,
+        initial_pose: Floats | None = None,
+        lidar_mount: Floats | None = None,
+        lap: Callable[[str], None] = _no_lap,
+    ) -> None:
+        self.config = config
+        self.detector = detector or make_detector(config.detector, adapted=config.adapted)
+        lidar = config.lidar
+        mount = (lidar.mount_x, lidar.mount_y, lidar.mount_yaw) if lidar_mount is None else lidar_mount
+        self.mount: Floats = np.array(mount, dtype=np.float64)
+        self.filter = LandmarkFilter(np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64))
+        self.start_pose = self.filter.pose
+        self._odometry = OdometryBuffer()
+        self._odometry_at_state: Floats | None = None
+        self._linearised_at = self.filter.pose
+        self._nursery = Nursery()
+        self._lap = lap
+
+    def push_odometry(self, odometry: Odometry) -> None:
+        """Take in one odometry reading."""
+        self._odometry.push(odometry)
+
+    def push_scan(self, scan: LaserScan) -> ScanUpdate:
+        """One step of the filter, to the stamp of the scan.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            Its odometry up to its last beam should have come before; what is missing is extrapolated.
+
+        Returns
+        -------
+        ScanUpdate
+        """
+        motion = self._motion_during(scan)
+        contours = trace(scan, self.config, motion, self.mount)
+        self._lap("contour")
+        found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
+        self._predict(motion)
+        seen = observe(found.corners, found.walls)
+        world = to_world(self.filter.mean[:3], self.mount, seen.looks)
+        model = self._expect()
+        self._lap("prediction")
+        chosen = associate(seen, world, self.filter, model, self.config.slam)
+        self._lap("association")
+        matched = np.flatnonzero(chosen >= 0)
+        nis = self._correct(matched, chosen[matched], seen.values, seen.noises, model)
+        self._lap("correction")
+        missed = self._count_sightings(scan, chosen[matched], world[matched])
+        matched_ids = tuple(self.filter.ids[chosen[matched]].tolist())
+        born = bear(self.filter, self._nursery, seen, world, chosen, self.mount, self.config.slam)
+        dropped = drop_unseen(self.filter, self.config.slam)
+        dropped += merge_twins(self.filter, matched_ids, self.config.slam)
+        self._lap("landmarks")
+        pose, covariance = self.filter.pose, self.filter.pose_covariance
+        return ScanUpdate(
+            scan.stamp, pose, covariance, len(found.corners), len(found.walls), matched_ids, missed, born, dropped, nis,
+            2 * len(matched),
+        )  # fmt: skip
+
+    @property
+    def odometry_pose(self) -> Floats:
+        """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
+        return np.zeros(3) if self._odometry_at_state is None else self._odometry_at_state
+
+    def corner_map(self) -> CornerMap:
+        """Corners of the map as they stand now."""
+        return self.filter.corner_map()
+
+    def wall_map(self) -> WallMap:
+        """Walls of the map as they stand now."""
+        return self.filter.wall_map()
+
+    def _motion_during(self, scan: LaserScan) -> tuple[Floats, Floats]:
+        start = scan.stamp - self.config.slam.odometry_lag
+        duration = float(scan.offsets.max()) if scan.offsets.size else 0.0
+        return self._odometry.during(start, start + duration)
+
+    def _predict(self, motion: tuple[Floats, Floats]) -> None:
+        """Move the pose along the odometry to the scan's stamp (eqs 23-24, 28)."""
+        if len(motion[0]) == 0:
+            return
+        now = self._odometry.pose_at_start(*motion)
+        before = now if self._odometry_at_state is None else self._odometry_at_state
+        self._odometry_at_state = now
+        increment = between(before, now)
+        noise = motion_noise(increment, self.config.slam.motion)
+        f = self.filter
+        start = self._linearised_at if self.config.slam.first_estimates else f.pose
+        predict(f.mean, f.covariance, f.size, increment, noise, start)
+        self._linearised_at = f.pose
+
+    def _expect(self) -> Model:
+        f, first = self.filter, self.config.slam.first_estimates
+        return predict_measurements(f.mean[:3], self.mount, f.mean, f.table, f.count, first)
+
+    def _correct(self, rows: Ints, landmarks: Ints, values: Floats, noises: Floats, model: Model) -> float:
+        """All matched observations at once (eqs 25-27)."""
+        if len(rows) == 0:
+            return 0.0
+        f = self.filter
+        jacobian, nu, noise = ekf.stack(rows, landmarks, values, noises, f.table, *model)
+        nis = ekf.correct(f.mean, f.covariance, f.size, ekf.landmark_columns(landmarks), jacobian, nu, noise)
+        f.wrap_walls(landmarks)
+        return max(nis, 0.0)
+
+    def _count_sightings(self, scan: LaserScan, landmarks: Ints, world: Floats) -> tuple[int, ...]:
+        """Count o for what was seen and f for what should have been (Fig. 7); returns the ids of the latter."""
+        f, config = self.filter, self.config
+        for k, landmark in enumerate(landmarks):
+            f.refresh(int(landmark), world[k])
+        f.observed[landmarks] += 1
+        ascending = scan.angles.size < 2 or scan.angles[0] <= scan.angles[-1]
+        way = slice(None) if ascending else slice(None, None, -1)
+        limit = min(config.lidar.max_range, scan.range_max)
+        should = expected_in_scan(
+            f.mean, f.table, f.count, compose(f.mean[:3], self.mount), scan.angles[way], scan.ranges[way], limit,
+            config.landmarks.min_side, config.landmarks.min_side_points, config.landmarks.min_wall,
+            config.landmarks.min_wall_points,
+        )  # fmt: skip
+        should[landmarks] = False
+        f.failed[: f.count][should] += 1
+        return tuple(f.ids[: f.count][should].tolist())
