@@ -8,6 +8,20 @@ from pathlib import Path
 from contourslam.errors import ResultError
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, where needed.
+
+    Raises
+    ------
+    ResultError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"{folder}: cannot be made ({error.strerror or error}); choose another folder") from error
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path to write to, and move it to `path` once the block has ended well.
@@ -30,8 +44,8 @@ def replacing(path: Path) -> Iterator[Path]:
         If the file cannot be written (no permission, disk full, the folder is a file).
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    make_folder(path.parent)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         temporary.replace(path)
     except OSError as error:

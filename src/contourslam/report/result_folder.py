@@ -11,8 +11,8 @@ import numpy as np
 from contourslam import __version__
 from contourslam.config import Config
 from contourslam.errors import MissingExtraError, ResultError
-from contourslam.recordings.trajectories import write_tum
-from contourslam.report.atomic import replacing, write_text
+from contourslam.recordings.trajectories import write_trajectory
+from contourslam.report.atomic import make_folder, write_text
 from contourslam.report.config_file import read_config, write_config
 from contourslam.report.map_files import write_geojson
 from contourslam.report.map_reader import read_geojson
@@ -92,8 +92,8 @@ def write_result_folder(
     ResultError
         If a file cannot be written.
     """
-    with replacing(folder / "trajectory.tum") as path:
-        write_tum(path, result.stamps, result.poses)
+    make_folder(folder)
+    write_trajectory(folder / "trajectory.tum", result.stamps, result.poses)
     write_scan_table(folder / "scans.csv", result)
     write_geojson(folder / "map.geojson", result.corner_map, result.wall_map)
     write_config(folder / "config.yaml", config, header=f"contourslam {__version__}\n{command}".strip())
