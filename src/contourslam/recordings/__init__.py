@@ -1,1 +1,19 @@
-"""."""
+"""Reading and writing of recordings, trajectories and relations; everything is checked, nothing is held whole."""
+
+from contourslam.recordings.opening import open_recording
+from contourslam.recordings.recording import Message, Recording, Topic
+from contourslam.recordings.relations import read_relations
+from contourslam.recordings.trajectories import read_trajectory, write_trajectory
+from contourslam.recordings.writer import RecordingWriter, write_recording
+
+__all__ = [
+    "Message",
+    "Recording",
+    "RecordingWriter",
+    "Topic",
+    "open_recording",
+    "read_relations",
+    "read_trajectory",
+    "write_recording",
+    "write_trajectory",
+]

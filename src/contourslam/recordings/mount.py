@@ -1,0 +1,85 @@
+"""Where the lidar sits on the robot, out of a recording's transforms."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.recordings.ros_messages import frame_name
+
+Floats = NDArray[np.float64]
+
+_BASES = ("base_link", "base_footprint")
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Place of the lidar in the base frame.
+
+    Attributes
+    ----------
+    base : str
+        The base frame.
+    pose : tuple of (float, float, float)
+        x (m), y (m), yaw (rad).
+    mirrored : bool
+        It hangs upside down.
+    """
+
+    base: str
+    pose: tuple[float, float, float]
+    mirrored: bool
+
+
+class FrameTree:
+    """Frames and the transforms between them."""
+
+    def __init__(self) -> None:
+        self._parents: dict[str, tuple[str, Floats]] = {}
+
+    def add(self, transforms: list[Any]) -> None:
+        """Add the transforms of a ``TFMessage``; the first one for a frame counts."""
+        for stamped in transforms:
+            child, parent = frame_name(stamped.child_frame_id), frame_name(stamped.header.frame_id)
+            self._parents.setdefault(child, (parent, _matrix(stamped.transform)))
+
+    def mount(self, lidar_frame: str, odometry_child: str) -> Mount | None:
+        """Find the lidar in the base frame: the one that the odometry speaks of, or else one of the usual names."""
+        lidar = self._ancestors(frame_name(lidar_frame))
+        for base in dict.fromkeys((frame_name(odometry_child), *_BASES)):
+            up_from_base = self._ancestors(base)
+            common = next((frame for frame in lidar if frame in up_from_base), None)
+            if base and common is not None:
+                matrix = np.linalg.inv(up_from_base[common]) @ lidar[common]
+                if not np.isfinite(matrix).all():
+                    return None
+                yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+                return Mount(base, (float(matrix[0, 3]), float(matrix[1, 3]), yaw), bool(matrix[2, 2] < 0.0))
+        return None
+
+    def _ancestors(self, frame: str) -> dict[str, Floats]:
+        """Give every frame above `frame`, nearest first, with the transform from `frame` to it."""
+        found = {frame: np.eye(4)}
+        matrix = np.eye(4)
+        while frame in self._parents:
+            frame, step = self._parents[frame]
+            if frame in found:  # a cycle: the transforms are wrong
+                break
+            matrix = step @ matrix
+            found[frame] = matrix
+        return found
+
+
+def _matrix(transform: Any) -> Floats:
+    """4 by 4 matrix of a transform message."""
+    q, t = transform.rotation, transform.translation
+    x, y, z, w = np.array([q.x, q.y, q.z, q.w]) / (np.linalg.norm([q.x, q.y, q.z, q.w]) or 1.0)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), t.x],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), t.y],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), t.z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )

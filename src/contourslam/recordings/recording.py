@@ -1,0 +1,102 @@
+"""What every recording offers, whatever its format."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from contourslam.scan import LaserScan, Odometry, TruePose
+
+Message = LaserScan | Odometry | TruePose
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One stream of messages in a recording.
+
+    Attributes
+    ----------
+    name : str
+        Topic of a bag, or the keyword that starts the lines of a CARMEN log.
+    message_type : str
+        ROS message type, or what a CARMEN line holds.
+    count : int
+        Number of messages; in a damaged recording, of those that can be read.
+    start, end : float or None
+        First and last stamp, s, where they are cheap to know.
+    """
+
+    name: str
+    message_type: str
+    count: int
+    start: float | None = None
+    end: float | None = None
+
+
+class Recording(ABC):
+    """A recording that is read message by message, never whole into memory.
+
+    Attributes
+    ----------
+    path : Path
+        File or folder.
+    lidar_mount : tuple of (float, float, float), or None
+        x (m), y (m), yaw (rad) of the lidar in the base frame, where the recording says so.
+    skipped : dict of str to int
+        Messages that could not be used in the latest pass of :meth:`messages`: the reason, with the place of the
+        first, and how many.
+    notes : list of str
+        What is worth knowing about the recording and changes nothing in how it is read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lidar_mount: tuple[float, float, float] | None = None
+        self.skipped: dict[str, int] = {}
+        self.notes: list[str] = []
+
+    @abstractmethod
+    def topics(self) -> list[Topic]:
+        """List what is in the recording, used or not, by name."""
+
+    @abstractmethod
+    def messages(self) -> Iterator[Message]:
+        """Yield scans, odometry and true poses in the order of the recording.
+
+        Stamps may repeat or run backwards. Each call starts a new pass.
+
+        Raises
+        ------
+        RecordingError
+            Where the recording is damaged or cut short, after everything before the damage has been yielded.
+        """
+
+    @property
+    @abstractmethod
+    def start(self) -> float | None:
+        """Earliest stamp, s; None in an empty recording."""
+
+    @property
+    @abstractmethod
+    def end(self) -> float | None:
+        """Latest stamp, s; None in an empty recording."""
+
+    @property
+    def duration(self) -> float | None:
+        """From the earliest to the latest stamp, s."""
+        start, end = self.start, self.end
+        return None if start is None or end is None else end - start
+
+
+class SkipCount:
+    """Counts what was skipped, by reason, into a recording's `skipped`; the reason carries the first place."""
+
+    def __init__(self, skipped: dict[str, int]) -> None:
+        skipped.clear()
+        self._skipped = skipped
+        self._keys: dict[str, str] = {}
+
+    def add(self, reason: str, place: str) -> None:
+        """Count one message skipped for `reason` at `place`."""
+        key = self._keys.setdefault(reason, f"{reason} (first: {place})")
+        self._skipped[key] = self._skipped.get(key, 0) + 1

@@ -1,0 +1,135 @@
+"""Scans, odometry and true poses turned into ROS 2 messages."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from contourslam.errors import RecordingError
+from contourslam.scan import LaserScan
+
+# What single precision and a lidar's own resolution leave of an angle, rad, and a generous bound for a beam's time, s.
+_EVEN_ANGLE = 1e-4
+_EVEN_TIME = 1e-4
+
+
+class Encoder:
+    """Builds standard messages (definitions of ROS 2 Humble; later ones are the same on the wire)."""
+
+    def __init__(self) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self.store = get_typestore(Stores.ROS2_HUMBLE)
+        self._types = self.store.types
+
+    def serialize(self, message: Any) -> bytes:
+        """Serialize a message as CDR."""
+        return bytes(self.store.serialize_cdr(message, message.__msgtype__))
+
+    def _make(self, name: str, **fields: Any) -> Any:
+        return self._types[name](**fields)
+
+    def header(self, stamp: float, frame: str) -> Any:
+        """Build a header; the stamp keeps its nanoseconds."""
+        seconds, nanoseconds = split_stamp(stamp)
+        time = self._make("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+        return self._make("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+    def scan(self, scan: LaserScan, frame: str) -> Any:
+        """Build a ``LaserScan`` message.
+
+        Raises
+        ------
+        RecordingError
+            If the beams are not evenly spaced in angle and time, which is all that the message can say.
+        """
+        angle_min, angle_increment = _even(np.unwrap(scan.angles), _EVEN_ANGLE, scan.stamp, "angle")
+        first_offset, time_increment = _even(scan.offsets, _EVEN_TIME, scan.stamp, "time")
+        count = scan.ranges.size
+        with np.errstate(over="ignore", invalid="ignore"):  # a range beyond single precision becomes inf: no return
+            ranges = scan.ranges.astype(np.float32)
+        return self._make(
+            "sensor_msgs/msg/LaserScan",
+            header=self.header(scan.stamp + first_offset, frame),
+            angle_min=angle_min,
+            angle_max=angle_min + angle_increment * max(count - 1, 0),
+            angle_increment=angle_increment,
+            time_increment=time_increment,
+            scan_time=abs(time_increment) * count,
+            range_min=scan.range_min,
+            range_max=scan.range_max,
+            ranges=ranges,
+            intensities=np.empty(0, dtype=np.float32),
+        )
+
+    def odometry(self, stamp: float, pose: np.ndarray, frame: str, child: str) -> Any:
+        """Build an ``Odometry`` message; covariance and speed are left at zero, which means unknown."""
+        x, y, heading = map(float, pose)
+        zero = self._make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+        return self._make(
+            "nav_msgs/msg/Odometry",
+            header=self.header(stamp, frame),
+            child_frame_id=child,
+            pose=self._make(
+                "geometry_msgs/msg/PoseWithCovariance",
+                pose=self._make(
+                    "geometry_msgs/msg/Pose",
+                    position=self._make("geometry_msgs/msg/Point", x=x, y=y, z=0.0),
+                    orientation=self._rotation(heading),
+                ),
+                covariance=np.zeros(36),
+            ),
+            twist=self._make(
+                "geometry_msgs/msg/TwistWithCovariance",
+                twist=self._make("geometry_msgs/msg/Twist", linear=zero, angular=zero),
+                covariance=np.zeros(36),
+            ),
+        )
+
+    def transform(self, stamp: float, pose: np.ndarray, frame: str, child: str) -> Any:
+        """Build a ``TFMessage`` of one transform."""
+        x, y, heading = map(float, pose)
+        transform = self._make(
+            "geometry_msgs/msg/Transform",
+            translation=self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=0.0),
+            rotation=self._rotation(heading),
+        )
+        stamped = self._make(
+            "geometry_msgs/msg/TransformStamped",
+            header=self.header(stamp, frame),
+            child_frame_id=child,
+            transform=transform,
+        )
+        return self._make("tf2_msgs/msg/TFMessage", transforms=[stamped])
+
+    def _rotation(self, heading: float) -> Any:
+        half = 0.5 * heading
+        return self._make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=math.sin(half), w=math.cos(half))
+
+
+def split_stamp(stamp: float) -> tuple[int, int]:
+    """Split a stamp into the seconds and nanoseconds that ROS can hold.
+
+    Raises
+    ------
+    RecordingError
+        If it lies before 0 or after the year 2038.
+    """
+    if not 0.0 <= stamp < 2.0**31 - 1:
+        raise RecordingError(f"a message at stamp {stamp} s cannot be recorded: ROS stamps run from 0 to 2**31 - 2")
+    seconds = math.floor(stamp)
+    nanoseconds = round((stamp - seconds) * 1e9)
+    return seconds + nanoseconds // 10**9, nanoseconds % 10**9
+
+
+def _even(values: np.ndarray, tolerance: float, stamp: float, what: str) -> tuple[float, float]:
+    """First value and step of evenly spaced values."""
+    if values.size == 0:
+        return 0.0, 0.0
+    first = float(values[0])
+    step = float(values[-1] - values[0]) / max(values.size - 1, 1)
+    if np.abs(values - (first + step * np.arange(values.size))).max() > tolerance:
+        raise RecordingError(
+            f"the scan at stamp {stamp} s cannot be recorded: its beams are not evenly spaced in {what}"
+        )
+    return first, step
