@@ -2,10 +2,12 @@
 
 import math
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.errors import MissingExtraError, ResultError
 from contourslam.simulation.config import RobotModel
@@ -37,23 +39,43 @@ def render_room(room: Room, path: Path, *, width: int = 1280, height: int = 860,
     ResultError
         If no picture can be drawn or written.
     """
-    if not os.environ.get("DISPLAY"):
-        os.environ.setdefault("MUJOCO_GL", "egl")  # read when MuJoCo is first imported
-    model = compile_world(room, RobotModel(), draw_flaws(0))
     mujoco = import_mujoco()
     try:
         from matplotlib.image import imsave
     except ImportError as error:
         raise MissingExtraError("pictures need matplotlib: pip install 'contourslam[report]'") from error
+    model = compile_world(room, RobotModel(), draw_flaws(0))
     _open_walls(model, mujoco, azimuth_deg)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    camera = _camera(mujoco, room, width / height, azimuth_deg)
     try:
-        with mujoco.Renderer(model, height, width) as renderer:
-            renderer.update_scene(data, _camera(mujoco, room, width / height, azimuth_deg))
-            imsave(path, renderer.render())
-    except (OSError, RuntimeError, ValueError, mujoco.FatalError) as error:
+        imsave(path, _draw(mujoco, model, camera, width, height))
+    except (ImportError, AttributeError, OSError, RuntimeError, ValueError, mujoco.FatalError) as error:
         raise ResultError(f"no picture of room {room.name} in {path}: {error}; try MUJOCO_GL=osmesa") from error
+
+
+def _draw(mujoco: Any, model: Any, camera: Any, width: int, height: int) -> NDArray[np.uint8]:
+    """Draw without a window, shape (height, width, 3)."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and not os.environ.get("MUJOCO_GL"):
+        # mujoco.Renderer would take the window system that was chosen when MuJoCo was imported; here is none.
+        from mujoco.egl import GLContext
+    else:
+        from mujoco import GLContext
+    window = GLContext(width, height)
+    try:
+        window.make_current()
+        data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=2 * model.ngeom + 100)
+        mujoco.mj_forward(model, data)
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), camera, every, scene)
+        frame, pixels = mujoco.MjrRect(0, 0, width, height), np.zeros((height, width, 3), dtype=np.uint8)
+        mujoco.mjr_render(frame, scene, context)
+        mujoco.mjr_readPixels(pixels, None, frame, context)
+        context.free()
+        return pixels[::-1]
+    finally:
+        window.free()
 
 
 def _open_walls(model: Any, mujoco: Any, azimuth_deg: float) -> None:

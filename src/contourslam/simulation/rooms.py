@@ -142,6 +142,9 @@ LARGE_HALL = Room(
         Box(18.0, 0.5, 1.6, 1.0, 1.2, colour=PINE),
         Box(22.2, 1.6, 1.2, 0.8, 0.8, 50.0, colour=CARTON),
         Box(12.2, -0.9, 0.8, 1.2, 0.15, colour=PINE),  # pallet, below the lidar
+        Box(1.2, 13.2, 1.2, 0.9, 1.1, 30.0, colour=CARTON),
+        Box(5.8, 10.0, 1.0, 0.8, 0.8, -15.0, colour=RED),
+        Box(7.4, 6.3, 1.2, 0.8, 1.0, 40.0, colour=CARTON),
         Box(8.2, 16.4, 1.2, 0.9, 1.1, 10.0, colour=PINE),
     ),
     route=(
