@@ -88,4 +88,4 @@ def test_the_incidence_is_the_angle_to_the_surface(short_run: SimulatedRun) -> N
 )
 def test_a_lidar_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="LidarModel"):
-        LidarModel(**wrong)  # type: ignore[arg-type]
+        LidarModel(**wrong)

@@ -109,4 +109,4 @@ def test_every_room_can_be_simulated(name: str) -> None:
 @pytest.mark.parametrize("wrong", [{"duration": 0.0}, {"speed": 0.0}, {"speed": 9.0}, {"noise": -0.01}])
 def test_a_configuration_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match=f"SimulationConfig.{next(iter(wrong))}"):
-        SimulationConfig(**wrong)  # type: ignore[arg-type]
+        SimulationConfig(**wrong)
