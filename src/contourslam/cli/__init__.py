@@ -1,0 +1,5 @@
+"""The command line: one module per command, each a thin shell around the library."""
+
+from contourslam.cli.entry import main
+
+__all__ = ["main"]

@@ -1,0 +1,147 @@
+"""``contourslam compare``: the paper's experiment, and its report."""
+
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+from contourslam.cli.console import Bar, chosen, complain, note, prepare_folder, print_json
+from contourslam.cli.interrupt import INTERRUPTED, Interrupt
+from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
+from contourslam.config import Config
+from contourslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from contourslam.experiments.parallel import Observer
+
+DETECTORS = ("matched_filter", "wu", "teh_chin", "curvature_scale_space")
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Compare landmark detectors: drive through a room once per seed, replay each drive through every detector.
+
+    Each detector runs with corners only, as in the paper, and with walls. The folder gets index.html (the report, opens
+    offline), its figures, metrics.json and the first drive's recording. Ctrl-C stops and reports what is done.
+
+    Example: contourslam compare --seeds 10 --jobs 2 -o out/comparison
+    """
+
+    output: Output
+    overwrite: Overwrite = False
+    room: str = "furnished_room"
+    """Room to drive through: furnished_room, office_corridor or large_hall."""
+    seeds: int = 10
+    """How many drives; their seeds are 0, 1, 2, ..."""
+    detectors: tuple[str, ...] = DETECTORS
+    """Detectors to compare."""
+    duration: float | None = None
+    """Length of a drive, s; two laps where left out, 180 s at least."""
+    lidar: str = "paper"
+    """Lidar: paper (500 beams at 10 Hz) or ydlidar_x4 (varying beams, drop-outs)."""
+    no_noise_sweep: Flag = False
+    """Leave out the error against range noise from 0 to 5 cm."""
+    no_details: Flag = False
+    """Leave out raw against refined corners, and the detectors without our adaptations."""
+    jobs: int = 0
+    """Processes to use; 0 for one per core."""
+    json: Json = False
+    settings: Settings = field(default_factory=Config)
+
+    def execute(self, command: str) -> int:
+        """Run the experiments, write the report and print Table I."""
+        if self.seeds < 1 or self.jobs < 0:
+            raise ConfigError("--seeds must be at least 1 and --jobs 0 or more")
+        from contourslam.detectors import make_detector
+        from contourslam.experiments.noise import LEVELS
+        from contourslam.experiments.study import study
+        from contourslam.report.comparison_metrics import comparison_metrics
+        from contourslam.report.html import write_report
+        from contourslam.simulation.config import LIDARS, SimulationConfig
+        from contourslam.simulation.rooms import ROOMS
+
+        for name in self.detectors:
+            make_detector(name)
+        room = chosen("room", self.room, ROOMS)
+        simulation = SimulationConfig(duration=self.duration, lidar=chosen("lidar", self.lidar, LIDARS))
+        prepare_folder(self.output, overwrite=self.overwrite)
+        with Interrupt() as interrupt, _Stages(interrupt) as stages:
+            outcome = study(
+                room,
+                range(self.seeds),
+                detectors=self.detectors,
+                config=self.settings,
+                simulation=simulation,
+                noise_levels=() if self.no_noise_sweep else LEVELS,
+                details=not self.no_details,
+                recording=self.output / "recording",
+                jobs=self.jobs or os.cpu_count() or 1,
+                observe=stages.observe,
+            )
+        if not any(seed.metrics for seed in outcome.comparison.seeds):
+            complain("interrupted before the first replay was done; there is nothing to report")
+            return INTERRUPTED
+        metrics = comparison_metrics(outcome, command=command)
+        write_report(self.output, outcome, command=command)
+        if self.json:
+            print_json(metrics)
+        else:
+            _print_table(metrics)
+            print(f"\nreport: {self.output / 'index.html'}")
+        if interrupt.requested and not outcome.complete:
+            complain(f"interrupted; {self.output} reports what was done")
+            return INTERRUPTED
+        return 0
+
+
+class _Stages:
+    """Shows the experiments one after the other, each with its bar."""
+
+    def __init__(self, interrupt: Interrupt) -> None:
+        self._interrupt = interrupt
+        self._bar: Bar | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.__exit__()
+
+    def observe(self, stage: str) -> "Observer":
+        """Begin a stage: end the last one's bar and start another."""
+        from contourslam.experiments.parallel import Observer
+
+        self.__exit__()
+        note(f"{stage} ...")
+        bar = self._bar = Bar(stage)
+        return Observer(lambda done, total: bar.to(done / total), lambda: self._interrupt.requested)
+
+
+def _print_table(metrics: dict[str, Any]) -> None:
+    """Print Table I: ours with corners only and with walls, and the paper's."""
+    seeds = len(metrics["seeds"])
+    print(
+        f"RMSE in {metrics['room']}, mean over {seeds} seed{'s' if seeds > 1 else ''}; x and y in m, heading in rad\n"
+    )
+    print(f"{'':<24}{'corners only':^26}{'with walls':^26}{'the paper':^26}")
+    print(f"{'':<24}" + f"{'x':>8}{'y':>8}{'heading':>9} " * 3)
+    walls = metrics["with_walls"]["detectors"]
+    for name, found in metrics["detectors"].items():
+        ours = [
+            {key: value["mean"] for key, value in table["rmse"].items()} for table in (found, walls.get(name)) if table
+        ]
+        printed = metrics["paper"].get(name)
+        columns = [*ours, *[{}] * (2 - len(ours)), printed["rmse"] if printed else {}]
+        print(f"{name:<24}" + "".join(_cells(column) for column in columns))
+    print(f"{'raw odometry':<24}" + _cells(_means(metrics["odometry"])))
+
+
+def _means(table: dict[str, Any] | None) -> dict[str, float] | None:
+    rmse = table and table["rmse"]
+    return rmse and {coordinate: value["mean"] for coordinate, value in rmse.items()}
+
+
+def _cells(rmse: dict[str, float] | None) -> str:
+    if not rmse:
+        return f"{'-':>8}{'-':>8}{'-':>9} "
+    return f"{rmse['x']:8.3f}{rmse['y']:8.3f}{rmse['theta']:9.4f} "

@@ -1,0 +1,117 @@
+"""What the commands say: results on standard output, everything about the work itself on standard error."""
+
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self, TextIO, TypeVar
+
+from contourslam.errors import ConfigError, ResultError
+
+T = TypeVar("T")
+
+
+def colour_wanted(stream: TextIO) -> bool:
+    """Whether colour may be written: on a terminal, and not where NO_COLOR is set (no-color.org)."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def note(text: str) -> None:
+    """Say something about the work."""
+    print(f"contourslam: {text}", file=sys.stderr, flush=True)
+
+
+def complain(text: str) -> None:
+    """Say that the work failed; red on a terminal."""
+    word = "\x1b[31merror:\x1b[0m" if colour_wanted(sys.stderr) else "error:"
+    print(f"contourslam: {word} {text}", file=sys.stderr, flush=True)
+
+
+def print_json(values: dict[str, Any]) -> None:
+    """Print a result for a script."""
+    from contourslam.report.result_folder import to_json
+
+    print(to_json(values), end="")
+
+
+def progress(items: Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
+    """Pass the items on and draw a bar on a terminal, once the work has taken a second.
+
+    Parameters
+    ----------
+    items : iterable
+        What is worked through.
+    what : str
+        Name of one item, such as ``"scan"``.
+    total : int, optional
+        How many there are, where known.
+    """
+    from tqdm import tqdm
+
+    yield from tqdm(items, total=total, unit=f" {what}", delay=1.0, disable=None, leave=False, ascii=_ascii())
+
+
+def _ascii() -> bool | None:
+    return None if "utf" in (sys.stderr.encoding or "").lower() else True
+
+
+class Bar:
+    """A bar for work that tells its own fraction, drawn on a terminal once the work has taken a second."""
+
+    def __init__(self, what: str) -> None:
+        from tqdm import tqdm
+
+        form = "{desc}: {percentage:3.0f}% |{bar}| {elapsed}"
+        self._bar = tqdm(desc=what, total=1.0, bar_format=form, delay=1.0, disable=None, leave=False, ascii=_ascii())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def to(self, fraction: float) -> None:
+        """Draw the bar up to a fraction between 0 and 1."""
+        self._bar.update(fraction - self._bar.n)
+
+
+def chosen(kind: str, name: str, choices: Mapping[str, T]) -> T:
+    """Look a name up; where it is unknown, say which there are.
+
+    Raises
+    ------
+    ConfigError
+        If the name is unknown.
+    """
+    if name not in choices:
+        raise ConfigError(f"there is no {kind} {name!r}; choose one of {', '.join(choices)}")
+    return choices[name]
+
+
+def prepare_folder(folder: Path, *, overwrite: bool) -> None:
+    """Make the output folder; one that holds something is refused, so that no result is lost by a repeated command.
+
+    Raises
+    ------
+    ResultError
+        If the folder holds files and `overwrite` is off, or it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        used = any(folder.iterdir())
+    except OSError as error:
+        raise ResultError(f"{folder}: cannot be used as output folder ({error.strerror or error})") from error
+    if used and not overwrite:
+        raise ResultError(f"{folder} is not empty; choose another folder with --output, or replace with --overwrite")
+
+
+def refuse_existing(path: Path, *, overwrite: bool) -> None:
+    """Keep a file that is there already.
+
+    Raises
+    ------
+    ResultError
+        If the file is there and `overwrite` is off.
+    """
+    if path.exists() and not overwrite:
+        raise ResultError(f"{path} is there already; choose another --output, or replace it with --overwrite")

@@ -1,0 +1,121 @@
+"""Choosing the command, and what becomes of failures; only the chosen command's module is imported."""
+
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Protocol
+
+from contourslam import __version__
+from contourslam.cli.console import colour_wanted, complain
+from contourslam.cli.interrupt import INTERRUPTED
+from contourslam.errors import ConfigError, ContourslamError
+
+COMMANDS = {
+    "simulate": "Simulate a robot in a furnished room and record it.",
+    "info": "Say what is in a recording and what is missing to map it.",
+    "detect": "Draw one scan: contours, responses, corners and walls.",
+    "run": "Map a recording: trajectory, corners, walls, occupancy grid.",
+    "evaluate": "Judge one or more result folders.",
+    "compare": "Compare the landmark detectors and write the report.",
+}
+"""Name of each command, and of its module here, with a summary; the module holds a class of that name, capitalised."""
+
+_LIST = "\n".join(f"  {name:<10}{summary}" for name, summary in COMMANDS.items())
+HELP = f"""usage: contourslam COMMAND ...
+
+Map a building as corners and walls from any 2-D lidar, and compare landmark detectors.
+
+commands:
+{_LIST}
+
+options:
+  -h, --help  show this help message and exit
+  --version   print the version and exit
+
+`contourslam COMMAND --help` explains a command, with an example."""
+
+FAILED, WRONG_USAGE = 1, 2
+
+
+class Command(Protocol):
+    """One command with its options."""
+
+    def execute(self, command: str) -> int:
+        """Do the work and return the exit code; `command` is the command line, for the record."""
+        ...
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program's name; the process's own where left out.
+
+    Returns
+    -------
+    int
+        0 done; 1 a known failure, said in one line on standard error; 2 wrong usage; 130 interrupted, with what
+        was done until then kept. An unknown failure keeps its traceback.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        if arguments[:1] in (["-h"], ["--help"]):
+            print(HELP)
+            return 0
+        if arguments[:1] == ["--version"]:
+            print(f"contourslam {__version__}")
+            return 0
+        try:
+            command = parse(arguments)
+        except SystemExit as stop:  # from tyro, which has said why
+            return stop.code if isinstance(stop.code, int) else WRONG_USAGE
+        except ConfigError as error:
+            complain(str(error))
+            return WRONG_USAGE
+        return command.execute(shlex.join(["contourslam", *arguments]))
+    except ContourslamError as error:
+        complain(str(error))
+        return FAILED
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of a pipe has seen enough, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+
+
+def parse(arguments: Sequence[str]) -> Command:
+    """Turn arguments into a command.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such command, a value is out of its range, or the file behind ``--config`` is no configuration.
+    SystemExit
+        After a command's help was printed, or if its options are wrong.
+    """
+    name = arguments[0] if arguments else ""
+    if name not in COMMANDS:
+        wrong = f"there is no command {name!r}; it" if name else "the command is missing; it"
+        raise ConfigError(f"{wrong} must be one of {', '.join(COMMANDS)} (`contourslam --help` explains them)")
+    module: Any = import_module(f"contourslam.cli.{name}")
+    kind = getattr(module, name.capitalize())
+
+    import tyro
+
+    if not colour_wanted(sys.stdout):
+        tyro._experimental_options["ansi_codes"] = False
+    # Options win over the file behind --config, so that must be read before they are.
+    default = kind.starting_from(arguments[1:]) if name == "run" else tyro.MISSING_NONPROP
+    command: Command = tyro.cli(
+        kind,
+        prog=f"contourslam {name}",
+        args=arguments[1:],
+        default=default,
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.DisallowNone),
+    )
+    return command

@@ -1,0 +1,73 @@
+"""Ctrl-C ends the work between two items, not in the middle of one: what is done until then is whole and kept."""
+
+import os
+import signal
+from collections.abc import Iterable, Iterator
+from types import FrameType, TracebackType
+from typing import Generic, Self, TypeVar
+
+from contourslam.errors import ContourslamError
+
+T = TypeVar("T")
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 + SIGINT, as shells have it."""
+
+
+class Interrupt:
+    """Inside this context the first Ctrl-C only asks to stop, the second one stops at once."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def __enter__(self) -> Self:
+        self._previous = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        signal.signal(signal.SIGINT, self._previous)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
+        # Not print: a handler may run in the middle of another print.
+        os.write(2, b"\ncontourslam: stopping, keeping what is done; Ctrl-C again stops at once\n")
+
+
+class UntilStopped(Generic[T]):
+    """The messages of a recording until it ends or Ctrl-C is pressed; says afterwards why there were no more.
+
+    Parameters
+    ----------
+    messages : iterable
+        What is read.
+    interrupt : Interrupt
+        Asked before each message is handed on.
+
+    Attributes
+    ----------
+    interrupted : bool
+        Ctrl-C ended the reading.
+    error : ContourslamError or None
+        The damage that ended it.
+    """
+
+    def __init__(self, messages: Iterable[T], interrupt: Interrupt) -> None:
+        self._messages = messages
+        self._interrupt = interrupt
+        self.interrupted = False
+        self.error: ContourslamError | None = None
+
+    def __iter__(self) -> Iterator[T]:
+        try:
+            for message in self._messages:
+                if self._interrupt.requested:
+                    self.interrupted = True
+                    return
+                yield message
+        except ContourslamError as error:
+            self.error = error
+            raise

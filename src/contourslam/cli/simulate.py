@@ -1,0 +1,65 @@
+"""``contourslam simulate``: a robot drives through a room, and its recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from contourslam.cli.console import Bar, chosen, note, print_json, refuse_existing
+from contourslam.cli.options import Json, Overwrite
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate a robot in a room and record it: scans, wheel odometry and true poses in a rosbag2 MCAP file.
+
+    The same room, options and seed give the same recording. ROS 2 and Foxglove read it.
+
+    Example: contourslam simulate --room furnished_room --seed 1 -o run.mcap
+    """
+
+    output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE.mcap")]
+    """File to write."""
+    overwrite: Overwrite = False
+    room: str = "furnished_room"
+    """Room to drive through: furnished_room, office_corridor or large_hall."""
+    seed: int = 0
+    """Seed of everything that chance decides: start, friction, odometry, noise."""
+    duration: float | None = None
+    """Length of the drive, s; two laps where left out, 180 s at least."""
+    speed: float = 0.4
+    """Cruising speed, m/s."""
+    lidar: str = "paper"
+    """Lidar: paper (500 beams at 10 Hz) or ydlidar_x4 (varying beams, drop-outs)."""
+    noise: float | None = None
+    """Standard deviation of every range, m, in place of the lidar's own noise."""
+    picture: Path | None = None
+    """Also render the room into this PNG file."""
+    json: Json = False
+
+    def execute(self, command: str) -> int:
+        """Simulate, record and say what was written."""
+        from contourslam.recordings import write_recording
+        from contourslam.simulation.config import LIDARS, SimulationConfig
+        from contourslam.simulation.picture import render_room
+        from contourslam.simulation.rooms import ROOMS
+        from contourslam.simulation.simulate import simulate
+
+        room = chosen("room", self.room, ROOMS)
+        config = SimulationConfig(
+            duration=self.duration, speed=self.speed, noise=self.noise, lidar=chosen("lidar", self.lidar, LIDARS)
+        )
+        refuse_existing(self.output, overwrite=self.overwrite)
+        with Bar("simulating") as bar:
+            run = simulate(room, config, self.seed, progress=bar.to)
+        write_recording(self.output, run.messages(), lidar_mount=tuple(run.lidar_mount.tolist()))
+        if self.picture is not None:
+            render_room(room, self.picture)
+        seconds = float(run.odometry.stamps[-1])
+        if self.json:
+            print_json({"recording": str(self.output), "room": room.name, "scans": len(run.scans), "seconds": seconds})
+        else:
+            print(f"{self.output}: {len(run.scans)} scans, {seconds:.0f} s in {room.name}")
+            note(f"map it with: contourslam run {self.output} -o out")
+        return 0
