@@ -3,8 +3,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from contourslam.config import Config
+from contourslam.evaluation.consistency import nees
+from contourslam.evaluation.detection import DetectionScore
+from contourslam.evaluation.errors import pose_errors
+from contourslam.evaluation.metrics import run_metrics
+from contourslam.experiments.adaptation import Adaptation
+from contourslam.experiments.compare import Comparison, SeedRuns
+from contourslam.experiments.noise import NoiseSweep
+from contourslam.experiments.refinement import Refinement
+from contourslam.experiments.replays import variants
+from contourslam.experiments.study import Study
 from contourslam.geometry.poses import between, compose
 from contourslam.scan import LaserScan, evenly_spaced
+from contourslam.simulation.config import SimulationConfig
+from contourslam.simulation.rooms import FURNISHED_ROOM
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 
@@ -92,3 +105,34 @@ def room_scan() -> Callable[..., LaserScan]:
         )
 
     return scan
+
+
+@pytest.fixture
+def make_study(make_run) -> Callable[..., Study]:
+    """A study of two detectors over three seeds, made of synthetic runs instead of simulated ones."""
+
+    def make(
+        detectors: tuple[str, ...] = ("matched_filter", "teh_chin"), seeds: int = 3, complete: bool = True
+    ) -> Study:
+        done = []
+        for seed in range(seeds):
+            runs = SeedRuns(seed)
+            for i, variant in enumerate(variants(detectors)):
+                run = make_run(variant.detector, seed=10 * seed + i)
+                runs.metrics[variant] = run_metrics(run)
+                runs.nees[variant] = nees(pose_errors(run.poses, run.truth), run.covariances)
+                if seed == 0:
+                    runs.results[variant] = run
+            done.append(runs)
+        comparison = Comparison(FURNISHED_ROOM, detectors, Config(), SimulationConfig(), tuple(done), complete)
+        single = {name: run_metrics(make_run(name, seed=77)) for name in detectors}
+        score = DetectionScore(*np.full((4, 3), 5), np.full(5, 0.008), np.full(5, 0.03), 5, 4)
+        return Study(
+            comparison,
+            NoiseSweep(np.array([0.0, 0.02]), (single, single), True),
+            Refinement(single, single, dict.fromkeys(detectors, score), True),
+            Adaptation(single, single, True),
+            complete,
+        )
+
+    return make

@@ -128,7 +128,7 @@ def compare(
         What all replays share; the lidar's part is taken from the simulated lidar, as from a data sheet.
     simulation : SimulationConfig, optional
     recording : Path, optional
-        The first seed's drive is recorded to this MCAP file, and replayed from it.
+        Folder to make: the first seed's drive is recorded there as a rosbag2 (MCAP), and replayed from it.
     jobs : int
         Processes to use. Other processes import the main script, which must then start its work under
         ``if __name__ == "__main__":``.
@@ -192,7 +192,8 @@ def _replay_seed(task: _Task, step: Step) -> SeedRuns:
 
 def _recorded(run: SimulatedRun, path: Path) -> list[Message]:
     """Record a run and read it back: what is replayed is what the file holds."""
-    write_recording(path, run.messages(), lidar_mount=run.lidar_mount)
+    x, y, yaw = run.lidar_mount.tolist()
+    write_recording(path, run.messages(), lidar_mount=(x, y, yaw))
     return list(open_recording(path).messages())
 
 

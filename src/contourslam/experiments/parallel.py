@@ -45,6 +45,8 @@ def each(
 ) -> Iterator[B]:
     """Do a piece of work on each item and give the results in the order of the items.
 
+    Ctrl-C, too, stops the work at the next step; what is done by then is given.
+
     Parameters
     ----------
     work : callable
@@ -86,7 +88,11 @@ def _in_turn(work: Callable[[A, Step], B], items: Sequence[A], steps: int, obser
     for item in items:
         if observer.stopped():
             return
-        yield work(item, step)
+        try:
+            result = work(item, step)
+        except KeyboardInterrupt:
+            return
+        yield result
 
 
 def _side_by_side(
@@ -97,11 +103,16 @@ def _side_by_side(
     counter, stop = context.Value("i", 0), context.Event()
     with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(counter, stop)) as pool:
         waiting: list[Future[B | None]] = [pool.submit(_one, work, item) for item in items]
+        pending = set(waiting)
+        told = 0
         try:
-            told = 0
-            pending = set(waiting)
             while pending:
-                pending = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED).not_done
+                try:
+                    pending = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED).not_done
+                except KeyboardInterrupt:  # the first one asks the workers to stop and hand in what they have
+                    if stop.is_set():
+                        raise
+                    stop.set()
                 if counter.value != told:
                     told = counter.value
                     observer.progress(told, steps * len(items))
@@ -111,7 +122,7 @@ def _side_by_side(
         except BrokenProcessPool as error:
             raise ContourslamError("a worker process died; was there enough memory? Try fewer jobs") from error
         finally:
-            stop.set()  # after an error or Ctrl-C the others end at their next step
+            stop.set()  # after an error the others end at their next step
             pool.shutdown(wait=True, cancel_futures=True)
     yield from (result for result in results if result is not None)
 

@@ -80,9 +80,12 @@ def nees_figure(
     axes.axhspan(*bounds, color=FAINT, alpha=0.6, linewidth=0.0, label=f"95 % for {runs} run{'s' * (runs != 1)}")
     axes.axhline(3.0, color=GREY, linewidth=0.8)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-    window = np.ones(max(1, round(seconds / max(step, 1e-9))))
+    window = np.ones(min(max(1, round(seconds / max(step, 1e-9))), len(times)))
     for name, values in nees.items():
-        smooth = np.convolve(values, window, mode="same") / np.convolve(np.ones(len(values)), window, mode="same")
+        known = np.isfinite(values)
+        count = np.convolve(known, window, mode="same")
+        total = np.convolve(np.where(known, values, 0.0), window, mode="same")
+        smooth = np.divide(total, count, out=np.full(len(values), np.nan), where=count > 0.5)
         axes.plot(times, smooth, color=colour(name), label=label(name))
     logarithmic(axes, "y")
     axes.set(xlabel="time (s)", ylabel="NEES of the pose (3 is ideal)")

@@ -1,0 +1,152 @@
+"""The few pieces of HTML that the report is made of; every text is escaped here and nowhere else."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from string import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A table cell.
+
+    Attributes
+    ----------
+    text : str
+    small : str
+        Put behind it in small print.
+    better : bool
+        Marks a number that beats the paper's.
+    """
+
+    text: str
+    small: str = ""
+    better: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A table row; an aside is a reference that does not compete."""
+
+    name: str
+    cells: Sequence[Cell]
+    aside: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture file beside the page, with the words for those who cannot see it."""
+
+    source: str
+    width: int
+    height: int
+    alt: str
+    caption: str
+    chart: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the page; `body` is HTML."""
+
+    anchor: str
+    title: str
+    body: str
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """Give a paragraph."""
+    attribute = f' class="{escape(kind)}"' if kind else ""
+    return f"<p{attribute}>{escape(text)}</p>"
+
+
+def table(caption: str, headers: Sequence[str], rows: Sequence[Row]) -> str:
+    """Give a table with a caption and header cells; it scrolls by itself where it is wider than the page."""
+    head = "".join(f'<th scope="col">{escape(header)}</th>' for header in headers)
+    body = "\n".join(_row(row) for row in rows)
+    return (
+        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
+        f"<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>"
+    )
+
+
+def _row(row: Row) -> str:
+    kind = ' class="aside"' if row.aside else ""
+    return f'<tr{kind}><th scope="row">{escape(row.name)}</th>{"".join(map(_cell, row.cells))}</tr>'
+
+
+def _cell(cell: Cell) -> str:
+    kind = ' class="better"' if cell.better else ""
+    small = f" <small>{escape(cell.small)}</small>" if cell.small else ""
+    return f"<td{kind}>{escape(cell.text)}{small}</td>"
+
+
+def figure(picture: Picture) -> str:
+    """Give a figure that opens in full size when clicked."""
+    kind = "chart" if picture.chart else "photo"
+    source = escape(picture.source)
+    return (
+        f'<figure><a href="{source}"><img class="{kind}" src="{source}" width="{picture.width}" '
+        f'height="{picture.height}" alt="{escape(picture.alt)}"></a>'
+        f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
+    )
+
+
+def pair(pictures: Sequence[Picture]) -> str:
+    """Give figures side by side where there is room."""
+    return f'<div class="pair">{"".join(map(figure, pictures))}</div>' if pictures else ""
+
+
+def verbatim(text: str) -> str:
+    """Give a text as it stands, such as a configuration."""
+    return f'<pre tabindex="0">{escape(text)}</pre>'
+
+
+def heading(text: str) -> str:
+    """Give a heading inside a section."""
+    return f"<h3>{escape(text)}</h3>"
+
+
+def folded(summary: str, body: str) -> str:
+    """Give a part that opens when asked; `body` is HTML."""
+    return f"<details><summary>{escape(summary)}</summary>{body}</details>"
+
+
+def definitions(terms: dict[str, str]) -> str:
+    """Give names and values."""
+    pairs = (f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in terms.items())
+    return f"<dl>{''.join(pairs)}</dl>"
+
+
+def page(title: str, *, lead: str, sections: Sequence[Section], footer: str, banner: str = "") -> str:
+    """Give the whole page, its style inside.
+
+    Parameters
+    ----------
+    title, footer : str
+    lead : str
+        Opening words.
+    sections : sequence of Section
+    banner : str
+        A warning above it all.
+
+    Returns
+    -------
+    str
+    """
+    resources = files("contourslam.report.page")
+    template = Template(resources.joinpath("template.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        title=escape(title),
+        style=resources.joinpath("style.css").read_text(encoding="utf-8"),
+        banner=f'<p class="warning" role="status">{escape(banner)}</p>' if banner else "",
+        lead=paragraph(lead, "lead"),
+        contents="\n".join(f'<li><a href="#{escape(s.anchor)}">{escape(s.title)}</a></li>' for s in sections),
+        sections="\n".join(
+            f'<section aria-labelledby="{escape(s.anchor)}">\n<h2 id="{escape(s.anchor)}">{escape(s.title)}</h2>\n'
+            f"{s.body}\n</section>"
+            for s in sections
+        ),
+        footer=escape(footer),
+    )

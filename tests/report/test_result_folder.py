@@ -1,0 +1,149 @@
+import json
+import resource
+import sys
+
+import numpy as np
+import pytest
+
+from contourslam.config import Config, SlamConfig
+from contourslam.errors import ContourslamError, ResultError
+from contourslam.evaluation.metrics import run_metrics
+from contourslam.recordings import read_trajectory
+from contourslam.report.atomic import write_bytes
+from contourslam.report.occupancy import OccupancyGrid
+from contourslam.report.result_folder import read_metrics, read_result_folder, to_json, write_result_folder
+
+
+def written(folder, run, **options):
+    config = Config(detector=run.detector, slam=SlamConfig(walls=True))
+    notes = write_result_folder(folder, run, config, run_metrics(run), command="contourslam run x.mcap", **options)
+    return config, notes
+
+
+def test_a_run_comes_back_from_its_folder(tmp_path, make_run):
+    run = make_run("wu")
+    config, notes = written(tmp_path / "deep" / "out", run)
+    back = read_result_folder(tmp_path / "deep" / "out")
+    assert notes == ()
+    assert back.config == config
+    assert back.result.detector == "wu"
+    np.testing.assert_array_equal(back.result.stamps, run.stamps)
+    for name in ("poses", "covariances", "odometry", "truth", "nis"):
+        np.testing.assert_allclose(getattr(back.result, name), getattr(run, name), rtol=1e-9, atol=1e-15, err_msg=name)
+    for name in ("nis_dof", "matched_count", "corner_count", "wall_count"):
+        np.testing.assert_array_equal(getattr(back.result, name), getattr(run, name), err_msg=name)
+    np.testing.assert_allclose(back.result.corner_map.positions, run.corner_map.positions, atol=1e-4)
+    again, once = run_metrics(back.result), run_metrics(run)
+    assert again["rmse"] == pytest.approx(once["rmse"], rel=1e-6)
+    assert again["nees"] == pytest.approx(once["nees"], rel=1e-6)
+
+
+def test_the_folder_holds_what_was_promised(tmp_path, make_run):
+    run = make_run()
+    grid = OccupancyGrid()
+    grid.add(np.zeros((1, 2)), np.ones((1, 2)))
+    written(tmp_path, run, grid=grid)
+    names = {path.name for path in tmp_path.iterdir()}
+    promised = {"trajectory.tum", "map.geojson", "map.pgm", "map.yaml", "metrics.json", "config.yaml", "map.png"}
+    assert names == promised | {"scans.csv"}
+    stamps, poses = read_trajectory(tmp_path / "trajectory.tum")
+    np.testing.assert_allclose(stamps, run.stamps)
+    np.testing.assert_allclose(poses, run.poses, atol=1e-9)
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert metrics["command"] == "contourslam run x.mcap"
+    assert metrics["complete"] is True
+    assert metrics["rmse"]["x"] < 0.02
+
+
+def test_a_run_without_truth_and_without_a_map_is_kept_too(tmp_path, make_run):
+    from dataclasses import replace
+
+    from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
+
+    run = replace(make_run(scans=1), truth=None, corner_map=EMPTY_CORNERS, wall_map=EMPTY_WALLS)
+    written(tmp_path, run)
+    assert read_result_folder(tmp_path).result.truth is None
+
+
+def test_a_truth_with_gaps_keeps_its_gaps(tmp_path, make_run):
+    run = make_run()
+    run.truth[3] = np.nan
+    written(tmp_path, run)
+    np.testing.assert_allclose(read_result_folder(tmp_path).result.truth, run.truth, atol=1e-9)
+
+
+def test_an_incomplete_run_says_so(tmp_path, make_run):
+    written(tmp_path, make_run(complete=False))
+    assert json.loads((tmp_path / "metrics.json").read_text())["complete"] is False
+    assert read_result_folder(tmp_path).result.complete is False
+
+
+@pytest.mark.parametrize("name", ["metrics.json", "map.geojson", "scans.csv", "config.yaml"])
+def test_a_missing_or_damaged_file_is_named(tmp_path, make_run, name):
+    written(tmp_path, make_run())
+    whole = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(whole[:-9] + b"\xff{]")
+    with pytest.raises(ContourslamError, match=name.replace(".", r"\.")):
+        read_result_folder(tmp_path)
+    (tmp_path / name).unlink()
+    with pytest.raises(ContourslamError, match=name.replace(".", r"\.")):
+        read_result_folder(tmp_path)
+
+
+@pytest.mark.parametrize("line", ["1,2,3", "", "1," * 18 + "x"])
+def test_a_damaged_line_of_the_scan_table_is_numbered(tmp_path, make_run, line):
+    written(tmp_path, make_run())
+    lines = (tmp_path / "scans.csv").read_text().splitlines()
+    lines[4] = line
+    (tmp_path / "scans.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(ResultError, match=r"scans\.csv: line 5 "):
+        read_result_folder(tmp_path)
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ResultError, match="there is no such result folder"):
+        read_result_folder(tmp_path / "none")
+
+
+def test_metrics_must_be_an_object(tmp_path):
+    (tmp_path / "metrics.json").write_text("[1]")
+    with pytest.raises(ResultError, match="JSON object"):
+        read_metrics(tmp_path / "metrics.json")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of a file as Linux does")
+def test_a_full_disk_is_said_and_the_old_file_stays(tmp_path):
+    path = tmp_path / "map.pgm"
+    write_bytes(path, b"old")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(ResultError, match=r"map\.pgm: cannot be written"):
+            write_bytes(path, b"x" * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_where_the_folder_should_be_is_said(tmp_path, make_run):
+    (tmp_path / "out").write_text("in the way")
+    with pytest.raises(ResultError, match="cannot be made"):
+        written(tmp_path / "out", make_run())
+
+
+def test_json_holds_no_number_that_json_does_not_know():
+    text = to_json({"a": np.nan, "b": [np.inf, np.float32(1.5)], "c": np.arange(3), "d": {1: (True, None)}})
+    assert json.loads(text) == {"a": None, "b": [None, 1.5], "c": [0, 1, 2], "d": {"1": [True, None]}}
+
+
+def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, make_run, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("contourslam.report.figures")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    _, notes = written(tmp_path, make_run())
+    assert len(notes) == 1
+    assert "contourslam[report]" in notes[0]
+    assert not (tmp_path / "map.png").exists()
+    assert read_result_folder(tmp_path).result.complete
