@@ -1,0 +1,63 @@
+import ast
+import os
+import shlex
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+from contourslam import __version__
+from contourslam.cli import main
+from contourslam.cli.entry import COMMANDS, parse
+
+HEAVY = ("numpy", "numba", "scipy", "matplotlib", "mujoco", "rosbags", "ruamel.yaml", "evo", "shapely")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    code = f"import sys; from contourslam.cli import main; main({arguments!r}); print(sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = ast.literal_eval(done.stdout.splitlines()[-1])
+    assert [name for name in loaded if name in HEAVY] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself_with_an_example_that_parses(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([name, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "(default:" in text
+    example = next(line for line in text.splitlines() if line.startswith("Example: "))
+    words = shlex.split(example.removeprefix("Example: "))
+    assert words[:2] == ["contourslam", name]
+    assert type(parse(words[1:])).__name__ == name.capitalize()
+
+
+def test_the_list_of_commands_has_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    for name, summary in COMMANDS.items():
+        assert f"{name:<10}{summary}" in text
+        assert import_module(f"contourslam.cli.{name}")
+
+
+def test_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"contourslam {__version__}\n"
+
+
+def test_the_module_is_the_command_line_too() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "contourslam", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"contourslam {__version__}\n"
+
+
+def test_no_colour_is_written_to_a_pipe() -> None:
+    environment = os.environ | {"TERM": "xterm-256color"}
+    done = subprocess.run(
+        [sys.executable, "-m", "contourslam", "run", "--help"], capture_output=True, check=True, env=environment
+    )
+    assert b"\x1b" not in done.stdout

@@ -1,0 +1,207 @@
+import errno
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from contourslam.cli import main
+from contourslam.recordings import read_trajectory
+from contourslam.report.result_folder import read_result_folder
+
+Failure = Callable[..., str]
+FILES = {
+    "trajectory.tum",
+    "map.geojson",
+    "map.pgm",
+    "map.yaml",
+    "map.png",
+    "metrics.json",
+    "config.yaml",
+    "scans.csv",
+}
+
+# Presses Ctrl-C after some messages of the recording, once or twice.
+INTERRUPTED = """
+import os, signal, sys
+from contourslam.cli import main
+from contourslam.recordings.carmen import CarmenRecording
+whole = CarmenRecording.messages
+def messages(self):
+    for i, message in enumerate(whole(self)):
+        if i == 40:
+            for _ in range(int(sys.argv[1])):
+                os.kill(os.getpid(), signal.SIGINT)
+        yield message
+CarmenRecording.messages = messages
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def test_a_run_leaves_every_promised_file(mapped: Path) -> None:
+    assert {path.name for path in mapped.iterdir()} == FILES
+    assert "contourslam run" in (mapped / "config.yaml").read_text()
+
+
+def test_the_map_of_a_known_room_is_right(mapped: Path) -> None:
+    result = read_result_folder(mapped).result
+    assert result.complete
+    start = np.array([2.0, 1.7])  # the run begins at zero
+    for corner in ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0)):
+        distances = np.linalg.norm(result.corner_map.positions + start - corner, axis=1)
+        assert distances.min() < 0.02
+    turn = 0.05 * (len(result.stamps) - 1)
+    end = np.array([0.8 * np.sin(turn), 0.8 * (1.0 - np.cos(turn))])
+    assert np.linalg.norm(result.poses[-1, :2] - end) < 0.02
+
+
+def test_the_configuration_a_run_wrote_gives_the_same_run(log: Path, mapped: Path, tmp_path: Path) -> None:
+    options = ["--detector", "wu", "--sigma-range", "0.02", "--no-walls"]
+    assert main(["run", str(log), "-o", str(tmp_path / "a"), *options]) == 0
+    assert main(["run", str(log), "-o", str(tmp_path / "b"), "--config", str(tmp_path / "a" / "config.yaml")]) == 0
+    first, second = (tmp_path / name / "trajectory.tum" for name in "ab")
+    assert first.read_bytes() == second.read_bytes()
+    assert first.read_bytes() != (mapped / "trajectory.tum").read_bytes()
+
+
+def test_an_option_beside_a_configuration_file_wins(log: Path, mapped: Path, tmp_path: Path) -> None:
+    arguments = [f"--config={mapped / 'config.yaml'}", "--min-wall", "0.7", "-o", str(tmp_path / "out")]
+    assert main(["run", str(log), *arguments, "--max-scans", "3", "--no-grid"]) == 0
+    old, new = (YAML(typ="safe").load(folder / "config.yaml") for folder in (mapped, tmp_path / "out"))
+    assert new["landmarks"].pop("min_wall") == 0.7
+    assert old["landmarks"].pop("min_wall") != 0.7
+    assert old == new
+
+
+def test_an_unknown_key_in_a_configuration_file_is_named(failure: Failure, tmp_path: Path) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_text("slam:\n  wals: true\n")
+    assert "slam.wals" in failure("run", "x.log", "-o", tmp_path / "out", "--config", path, code=2)
+
+
+def test_a_missing_configuration_file_is_named(failure: Failure, tmp_path: Path) -> None:
+    path = tmp_path / "none.yaml"
+    assert str(path) in failure("run", "x.log", "-o", tmp_path / "out", "--config", path, code=2)
+
+
+def test_a_folder_that_holds_something_is_refused(
+    failure: Failure, log: Path, mapped: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (mapped / "metrics.json").read_bytes()
+    assert "--overwrite" in failure("run", log, "-o", mapped)
+    assert (mapped / "metrics.json").read_bytes() == before
+
+
+def test_overwriting_leaves_nothing_of_the_run_before(log: Path, tmp_path: Path) -> None:
+    arguments = ["run", str(log), "-o", str(tmp_path), "--overwrite", "--max-scans", "5"]
+    assert main(arguments) == 0
+    assert (tmp_path / "map.pgm").exists()
+    assert main([*arguments, "--no-grid"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.pgm", "map.yaml"}
+
+
+def test_an_output_folder_that_cannot_be_made_is_a_known_failure(failure: Failure, log: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert "output folder" in failure("run", log, "-o", tmp_path / "file")
+
+
+def test_an_unknown_detector_lists_those_there_are_and_writes_nothing(
+    failure: Failure, log: Path, tmp_path: Path
+) -> None:
+    said = failure("run", log, "-o", tmp_path / "out", "--detector", "harris")
+    assert "matched_filter, wu, teh_chin, curvature_scale_space" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_log_without_scans_says_what_it_has(failure: Failure, tmp_path: Path) -> None:
+    path = tmp_path / "wheels.log"
+    path.write_text("ODOM 0 0 0 0 0 0 1.0 host 1.0\n" * 3)
+    said = failure("run", path, "-o", tmp_path / "out")
+    assert "FLASER" in said
+    assert "ODOM: 3" in said
+
+
+def test_a_truncated_log_keeps_the_map_of_what_came_before(failure: Failure, log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cut.log"
+    content = log.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    said = failure("run", path, "-o", tmp_path / "out")
+    assert "cut short" in said
+    assert str(tmp_path / "out") in said
+    kept = read_result_folder(tmp_path / "out")
+    assert 25 <= len(kept.result.stamps) <= 30
+    assert not kept.result.complete
+    assert any("cut short" in reason for reason in kept.result.skipped)
+    assert (tmp_path / "out" / "map.pgm").exists()
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_ctrl_c_in_mid_run_keeps_what_is_done(presses: int, log: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = [sys.executable, "-c", INTERRUPTED, str(presses), "run", str(log), "-o", str(out)]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 130, done.stderr
+    assert "Traceback" not in done.stderr
+    assert str(out) in done.stderr.splitlines()[-1]
+    kept = read_result_folder(out).result
+    assert 15 <= len(kept.stamps) <= 20  # odometry and scan alternate in the log
+    assert not kept.complete
+    assert (out / "map.pgm").exists()
+
+
+def test_a_full_disk_is_a_known_failure(
+    failure: Failure, log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    said = failure("run", log, "-o", tmp_path / "out", "--max-scans", "3", "--no-grid")
+    assert "No space left on device" in said
+
+
+def test_without_the_report_extra_all_but_the_picture_is_written(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("contourslam.report.figures")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main(["run", str(log), "-o", str(tmp_path), "--max-scans", "3"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.png"}
+    assert "contourslam[report]" in capsys.readouterr().err
+
+
+def test_every_and_max_scans_thin_the_recording(log: Path, tmp_path: Path) -> None:
+    assert main(["run", str(log), "-o", str(tmp_path), "--every", "3", "--max-scans", "4", "--no-grid"]) == 0
+    stamps, _ = read_trajectory(tmp_path / "trajectory.tum")
+    assert stamps.tolist() == pytest.approx([100.0, 100.6, 101.2, 101.8])
+
+
+def test_every_zero_is_refused(failure: Failure, log: Path, tmp_path: Path) -> None:
+    assert "--every" in failure("run", log, "-o", tmp_path / "out", "--every", "0")
+
+
+def test_relations_are_judged_beside_raw_odometry(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    relations = tmp_path / "truth.relations"
+    turn = 0.05 * 50
+    relations.write_text(f"100.0 110.0 {0.8 * np.sin(turn)} {0.8 * (1 - np.cos(turn))} 0 0 0 {turn}\n")
+    arguments = ["run", str(log), "-o", str(tmp_path / "out"), "--relations", str(relations), "--json"]
+    assert main(arguments) == 0
+    metrics = json.loads(capsys.readouterr().out)
+    assert metrics["relations"]["count"] == 1
+    assert metrics["relations"]["translation"]["mean"] < metrics["odometry_relations"]["translation"]["mean"]
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["relations"] == metrics["relations"]
+
+
+def test_a_wrong_relations_file_fails_before_any_work(failure: Failure, log: Path, tmp_path: Path) -> None:
+    relations = tmp_path / "truth.relations"
+    relations.write_text("1 2 3\n")
+    assert "line 1" in failure("run", log, "-o", tmp_path / "out", "--relations", relations)
+    assert not (tmp_path / "out").exists()
