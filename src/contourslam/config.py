@@ -81,9 +81,9 @@ class LandmarkConfig:
     """A wall segment is at least this long, m."""
     min_wall_points: int = 8
     """A wall segment has at least this many beams."""
-    position_floor: float = 0.004
+    position_floor: float = 0.001
     """Standard deviation added to a corner's position and a wall's distance for what the noise does not explain, m."""
-    angle_floor_deg: float = 0.2
+    angle_floor_deg: float = 0.05
     """Standard deviation added to a wall's direction for what the noise does not explain, degrees."""
     refined: bool = True
     """Refine each corner by intersecting the lines fitted to its sides; off, the raw contour vertex is used."""
@@ -96,13 +96,13 @@ class LandmarkConfig:
 class MotionConfig:
     """Noise of the wheel odometry (R of eq. 24), growing with the distance and angle driven."""
 
-    forward_per_sqrt_m: float = 0.02
+    forward_per_sqrt_m: float = 0.05
     """Standard deviation of the distance after one metre, m."""
-    turn_per_sqrt_m_deg: float = 1.0
+    turn_per_sqrt_m_deg: float = 4.0
     """Standard deviation of the heading after one metre straight on, degrees."""
-    turn_per_sqrt_rad_deg: float = 1.5
+    turn_per_sqrt_rad_deg: float = 6.0
     """Standard deviation of the heading after turning by one radian, degrees."""
-    lateral_per_sqrt_m: float = 0.01
+    lateral_per_sqrt_m: float = 0.03
     """Standard deviation of the sideways slip after one metre, m."""
 
     def __post_init__(self) -> None:
@@ -117,7 +117,7 @@ class SlamConfig:
 
     walls: bool = False
     """Walls are landmarks too; off, corners only as in the paper's Table I."""
-    association: Association = "mutual"
+    association: Association = "joint"
     """How an observation finds its landmark; "nearest" is the paper's."""
     nearest_threshold: float = 0.5
     """Threshold of the nearest-neighbour association, m."""
