@@ -13,7 +13,9 @@ Floats = NDArray[np.float64]
 @kernel
 def wrap_angle(angle: float) -> float:
     """Wrap one angle to (-pi, pi] (kernel; also callable from other kernels)."""
-    return -((-angle + math.pi) % (2.0 * math.pi) - math.pi)
+    wrapped = -((-angle + math.pi) % (2.0 * math.pi) - math.pi)
+    # Just beyond pi the remainder rounds up to a whole turn, which would give -pi.
+    return wrapped if wrapped != -math.pi else math.pi
 
 
 def wrap(angles: Floats) -> Floats:
@@ -29,4 +31,5 @@ def wrap(angles: Floats) -> Floats:
     ndarray, same shape
         The same directions in (-pi, pi], rad.
     """
-    return np.asarray(-((-np.asarray(angles) + np.pi) % (2.0 * np.pi) - np.pi))
+    wrapped = -((-np.asarray(angles) + np.pi) % (2.0 * np.pi) - np.pi)
+    return np.where(wrapped == -np.pi, np.pi, wrapped)
