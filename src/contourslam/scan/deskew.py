@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between, compose
 from contourslam.kernels import kernel
 from contourslam.scan.laser_scan import LaserScan
@@ -35,7 +36,7 @@ def _deskew(
             weight = (offsets[i] - times[knot]) / span if span > 0.0 else 0.0
             x = motion[knot, 0] + weight * (motion[knot + 1, 0] - motion[knot, 0])
             y = motion[knot, 1] + weight * (motion[knot + 1, 1] - motion[knot, 1])
-            turn = motion[knot, 2] + weight * (motion[knot + 1, 2] - motion[knot, 2])
+            turn = motion[knot, 2] + weight * wrap_angle(motion[knot + 1, 2] - motion[knot, 2])
         bearing = angles[i] + turn
         points[count, 0] = x + ranges[i] * math.cos(bearing)
         points[count, 1] = y + ranges[i] * math.sin(bearing)
@@ -75,7 +76,8 @@ def deskew(
     if len(times) > 1:
         lidar = compose(base_poses, T_base_lidar)
         index = min(max(int(np.searchsorted(times, 0.0, side="right")) - 1, 0), len(times) - 2)
-        weight = -times[index] / max(times[index + 1] - times[index], 1e-9)
+        span = times[index + 1] - times[index]
+        weight = -times[index] / span if span > 0.0 else 0.0
         start = compose(lidar[index], between(lidar[index], lidar[index + 1]) * weight)
         motion = between(start, lidar)
     return _deskew(scan.ranges, scan.angles, scan.offsets, valid, times, motion)
