@@ -83,7 +83,7 @@ def transform(pose: Floats, points: Floats) -> Floats:
 
 
 def interpolate(stamps: Floats, poses: Floats, wanted: Floats) -> Floats:
-    """Poses at the wanted times, moving at constant twist between neighbours; clamped at both ends.
+    """Poses at the wanted times, moving straight and turning evenly between neighbours; clamped at both ends.
 
     Parameters
     ----------

@@ -24,12 +24,12 @@ class LaserScan:
     offsets : ndarray, shape (n,)
         Time of each beam after `stamp`, s.
     range_min, range_max : float
-        Limits inside which a range is a measurement, m.
+        Limits inside which a range is a measurement, m; `range_max` may be infinite.
 
     Raises
     ------
     ScanError
-        If the three arrays differ in shape, or a stamp, angle, offset or limit is not finite.
+        If the three arrays differ in shape, a stamp, angle or offset is not finite, or the limits are not a range.
     """
 
     stamp: float
