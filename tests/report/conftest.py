@@ -49,7 +49,7 @@ def square_map(rng: np.random.Generator) -> tuple[CornerMap, WallMap]:
     return corners, walls
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_run() -> Callable[..., RunResult]:
     """A run through a 6 m by 4 m room whose errors are as large as its covariance says."""
 
@@ -88,7 +88,7 @@ def make_run() -> Callable[..., RunResult]:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def room_scan() -> Callable[..., LaserScan]:
     """A noiseless scan of the 6 m by 4 m room from a pose inside it."""
 
@@ -107,7 +107,7 @@ def room_scan() -> Callable[..., LaserScan]:
     return scan
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_study(make_run) -> Callable[..., Study]:
     """A study of two detectors over three seeds, made of synthetic runs instead of simulated ones."""
 
@@ -118,7 +118,7 @@ def make_study(make_run) -> Callable[..., Study]:
         for seed in range(seeds):
             runs = SeedRuns(seed)
             for i, variant in enumerate(variants(detectors)):
-                run = make_run(variant.detector, seed=10 * seed + i)
+                run = make_run(variant.detector, seed=10 * seed + i, scans=80)
                 runs.metrics[variant] = run_metrics(run)
                 runs.nees[variant] = nees(pose_errors(run.poses, run.truth), run.covariances)
                 if seed == 0:

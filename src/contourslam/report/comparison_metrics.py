@@ -8,6 +8,7 @@
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from contourslam.evaluation.metrics import Metrics
@@ -47,6 +48,8 @@ def comparison_metrics(study: Study, *, command: str = "") -> dict[str, Any]:
         "command": command,
         "complete": study.complete,
         "room": comparison.room.name,
+        "simulation": asdict(comparison.simulation),
+        "config": asdict(comparison.config),
         "seeds": [seed.seed for seed in comparison.seeds],
         "detectors": _detectors(comparison, "corners"),
         "with_walls": {"detectors": _detectors(comparison, "walls")},

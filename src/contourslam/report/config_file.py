@@ -4,11 +4,14 @@ import dataclasses
 import io
 import types
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from contourslam.config import Config
 from contourslam.errors import ConfigError
 from contourslam.report.atomic import write_text
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 T = TypeVar("T")
 
@@ -34,8 +37,8 @@ def write_config(path: Path, config: Config, *, header: str = "") -> None:
     write_text(path, comments + config_text(config))
 
 
-def config_text(config: Config) -> str:
-    """Give a configuration as YAML."""
+def config_text(config: "DataclassInstance") -> str:
+    """Give a configuration, or one stage's, as YAML."""
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)

@@ -6,10 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from contourslam.report.figures.style import BLUE, FAINT, GREY, ORANGE, colour, label, logarithmic, styled
+from contourslam.report.figures.style import BLUE, FAINT, GREY, INK, ORANGE, colour, label, logarithmic, styled
 
 Floats = NDArray[np.float64]
 
+_MARKERS = "osD^v"
 _STAGES = ("#0072b2", "#56b4e9", "#009e73", "#f0e442", "#e69f00", "#d55e00", "#aa4499", "#999999")
 
 
@@ -17,7 +18,7 @@ _STAGES = ("#0072b2", "#56b4e9", "#009e73", "#f0e442", "#e69f00", "#d55e00", "#a
 def rmse_figure(
     rmse: Mapping[str, tuple[float, float]], paper: Mapping[str, float], *, odometry: float, bound: float | None = None
 ) -> Figure:
-    """Draw each detector's position error beside the paper's, on a logarithmic scale.
+    """Draw each detector's position error beside the paper's, on a logarithmic scale (so points: bars need a zero).
 
     Parameters
     ----------
@@ -36,23 +37,23 @@ def rmse_figure(
     """
     figure = Figure(figsize=(6.0, 3.2), layout="constrained")
     axes = figure.add_subplot()
-    names = list(rmse)
-    place = np.arange(len(names))
-    means, spreads = 100.0 * np.array([rmse[name] for name in names]).reshape(-1, 2).T
-    theirs = 100.0 * np.array([paper.get(name, np.nan) for name in names])
-    axes.barh(place - 0.19, means, 0.36, color=[colour(name) for name in names], label="this run")
-    whiskers = np.stack([np.minimum(spreads, 0.9 * means), spreads])  # a bar on a log axis cannot reach zero
-    axes.errorbar(means, place - 0.19, xerr=whiskers, fmt="none", ecolor="#222222", elinewidth=1.0, capsize=2.5)
-    axes.barh(place + 0.19, theirs, 0.36, color=FAINT, label="paper")
-    for y, value in [*zip(place - 0.19, means, strict=True), *zip(place + 0.19, theirs, strict=True)]:
-        if np.isfinite(value):
-            axes.annotate(f"{value:.1f}", (value, y), (9, 0), textcoords="offset points", va="center", fontsize=8.5)
+    place = np.arange(len(rmse))
+    means, spreads = 100.0 * np.array(list(rmse.values())).reshape(-1, 2).T
+    theirs = 100.0 * np.array([paper.get(name, np.nan) for name in rmse])
+    axes.hlines(place, means, theirs, color=FAINT, linewidth=2.0, zorder=2)
+    axes.plot(theirs, place, "D", color=GREY, markersize=7, label="paper")
+    whiskers = np.stack([np.minimum(spreads, 0.9 * means), spreads])  # below zero a log axis has no place
+    axes.errorbar(means, place, xerr=whiskers, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3.0, zorder=2.5)
+    axes.scatter(means, place, s=80, c=[colour(name) for name in rmse], label="here", zorder=3)
+    for x, y in [*zip(means, place, strict=True), *zip(theirs, place, strict=True)]:
+        if np.isfinite(x):
+            axes.annotate(f"{x:.2g}", (x, y), (0, 8), textcoords="offset points", ha="center", fontsize=8.5)
     axes.axvline(100.0 * odometry, color=ORANGE, linestyle="--", label="raw odometry")
     if bound is not None:
         axes.axvline(100.0 * bound, color=GREY, linestyle=":", label="Cramér-Rao bound")
     logarithmic(axes, "x")
-    axes.set_yticks(place, [label(name) for name in names])
-    axes.invert_yaxis()
+    axes.set_yticks(place, [label(name) for name in rmse])
+    axes.set_ylim(len(rmse) - 0.5, -0.6)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("RMSE of the position (cm)")
     figure.legend(loc="outside lower left", ncols=4)
@@ -78,10 +79,11 @@ def noise_figure(levels: Floats, rmse: Mapping[str, Floats], *, odometry: float 
     """
     figure = Figure(figsize=(6.0, 5.0), layout="constrained")
     position, heading = figure.subplots(2, 1, sharex=True)
-    for name, errors in rmse.items():
-        style = {"color": colour(name), "marker": "o", "markersize": 4}
-        position.plot(100.0 * levels, 100.0 * np.hypot(errors[:, 0], errors[:, 1]), label=label(name), **style)
-        heading.plot(100.0 * levels, np.degrees(errors[:, 2]), **style)
+    for i, (name, errors) in enumerate(rmse.items()):
+        style = {"color": colour(name), "marker": _MARKERS[i % len(_MARKERS)], "markersize": 5}
+        x = 100.0 * levels + 0.05 * (i - 0.5 * (len(rmse) - 1))  # side by side: equal lines would hide each other
+        position.plot(x, 100.0 * np.hypot(errors[:, 0], errors[:, 1]), label=label(name), **style)
+        heading.plot(x, np.degrees(errors[:, 2]), **style)
     if odometry is not None:
         position.axhline(100.0 * odometry, color=ORANGE, linestyle="--", label="raw odometry")
     for axes, name in ((position, "position RMSE (cm)"), (heading, "heading RMSE (°)")):

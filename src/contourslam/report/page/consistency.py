@@ -22,7 +22,7 @@ def section(study: Study, gallery: Gallery) -> Section:
             rates = [spread(values.get("nees"), 2), spread(values.get("nis"), 2)]
             rows.append(Row(label(name), [*rates, *shares, Cell(percent(mean(values.get("fnr"))))]))
         if rows:
-            caption = f"Consistency with {MODE_NAMES[mode]}; a consistent filter has 95 % inside 2σ"
+            caption = f"Consistency, {MODE_NAMES[mode]}; a consistent filter has 95 % inside 2σ"
             parts.append(table(caption, _HEADERS, rows))
     pictures = [picture for mode in MODES if (picture := _picture(study, gallery, mode))]
     return Section("consistency", "Consistency and false negatives", "\n".join(parts) + pair(pictures))
@@ -46,7 +46,7 @@ def _picture(study: Study, gallery: Gallery, mode: Mode) -> Picture | None:
     return gallery.add(
         f"nees_{mode}",
         drawn,
-        alt=f"NEES of the pose over time with {MODE_NAMES[mode]}, one line a detector, beside its 95 % bounds",
-        caption=f"NEES of the pose with {MODE_NAMES[mode]}, mean over the seeds; the band holds 95 % of a consistent "
+        alt=f"NEES of the pose over time, {MODE_NAMES[mode]}, one line a detector, beside its 95 % bounds",
+        caption=f"NEES of the pose, {MODE_NAMES[mode]}, mean over the seeds; the band holds 95 % of a consistent "
         "filter's values. Below it the filter is too cautious, above it too sure.",
     )

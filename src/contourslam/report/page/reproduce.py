@@ -24,6 +24,7 @@ def section(study: Study, command: str) -> Section:
         definitions(terms),
         heading("Configuration"),
         folded("Every setting of the pipeline that was used", verbatim(config_text(comparison.config))),
+        folded("Every setting of the simulation", verbatim(config_text(comparison.simulation))),
         paragraph("metrics.json beside this page holds every number, figures/ the figures as files.", "note"),
     ]
     return Section("reproduce", "Reproduce this", "\n".join(parts))

@@ -11,7 +11,7 @@ from contourslam.report.comparison_metrics import mean, shared
 from contourslam.report.figures.bars import rmse_figure
 from contourslam.report.figures.style import label
 from contourslam.report.page.common import COORDINATES, MODE_NAMES, SIGNS, UNITS, Gallery, number, position, spread
-from contourslam.report.page.markup import Cell, Picture, Row, Section, figure, paragraph, table
+from contourslam.report.page.markup import Cell, Picture, Row, Section, pair, paragraph, table
 from contourslam.report.paper import TABLE_I
 
 
@@ -25,12 +25,9 @@ def section(study: Study, gallery: Gallery) -> Section:
             "the comparison is one of scale. Green beats the paper."
         )
     ]
-    for mode in MODES:
-        found = study.comparison.table(mode)
-        if found:
-            parts.append(_table(study, mode, found))
-            picture = _overview(study, gallery, mode)
-            parts += [figure(picture)] if picture else []
+    tables = {mode: found for mode in MODES if (found := study.comparison.table(mode))}
+    parts += [_table(study, mode, found) for mode, found in tables.items()]
+    parts.append(pair([picture for mode in tables if (picture := _overview(study, gallery, mode))]))
     return Section("table-1", "Table I", "\n".join(parts))
 
 
@@ -50,7 +47,7 @@ def _table(study: Study, mode: Mode, found: dict[str, Metrics]) -> str:
     odometry, bound = shared(study.comparison, "odometry_rmse"), shared(study.comparison, "cramer_rao")
     rows += _reference("raw odometry", odometry)
     rows += _reference("Cramér-Rao bound, room known", bound and bound["filtered"])
-    return table(f"RMSE with {MODE_NAMES[mode]}", headers, rows)
+    return table(f"RMSE, {MODE_NAMES[mode]}", headers, rows)
 
 
 def _reference(title: str, values: dict[str, Any] | None) -> list[Row]:
@@ -75,8 +72,8 @@ def _overview(study: Study, gallery: Gallery, mode: Mode) -> Picture | None:
     return gallery.add(
         f"rmse_{mode}",
         drawn,
-        alt=f"Bars of the position error with {MODE_NAMES[mode]}: {values}; beside each the paper's",
-        caption=f"Position RMSE with {MODE_NAMES[mode]}, mean and standard deviation over the seeds; logarithmic.",
+        alt=f"Position error, {MODE_NAMES[mode]}: {values}; beside each the paper's",
+        caption=f"Position RMSE, {MODE_NAMES[mode]}: mean and standard deviation over the seeds; logarithmic.",
     )
 
 

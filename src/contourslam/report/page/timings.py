@@ -29,9 +29,11 @@ def _picture(study: Study, gallery: Gallery, mode: Mode) -> Picture | None:
         stages[name] = {stage: (mean(time) or 0.0) / scans for stage, time in (found.get("seconds") or {}).items()}
     if not any(stages.values()):
         return None
+    first = next((run for name in stages if (run := study.comparison.first(name, mode)) is not None), None)
+    order = () if first is None else tuple(first.seconds)  # in the order in which a scan passes through them
     return gallery.add(
         f"timings_{mode}",
-        timing_figure(stages),
-        alt=f"Stacked bars: milliseconds per scan and stage with {MODE_NAMES[mode]}, one bar a detector",
-        caption=f"Time per scan with {MODE_NAMES[mode]}, stage by stage.",
+        timing_figure(stages, order),
+        alt=f"Stacked bars: milliseconds per scan and stage, {MODE_NAMES[mode]}, one bar a detector",
+        caption=f"Time per scan, {MODE_NAMES[mode]}, stage by stage.",
     )
