@@ -16,7 +16,7 @@ help: ## List the targets.
 
 demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, write the report to demo/ (minutes).
 	$(BIN)/contourslam compare --room furnished_room --seeds 3 --jobs 2 --output demo --overwrite
-	$(BIN)/contourslam run demo/recordings/furnished_room-0.mcap --output demo/run --overwrite
+	$(BIN)/contourslam run demo/recording --output demo/run --overwrite
 	@echo "Open demo/index.html in a browser; demo/run holds the map of the first recording."
 
 test: $(VENV)/.dev ## Run the tests.

@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
-from contourslam.cli.console import Bar, chosen, complain, note, prepare_folder, print_json
+from contourslam.cli.console import Bar, chosen, complain, make_way, note, prepare_folder, print_json
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
 from contourslam.config import Config
@@ -64,6 +64,8 @@ class Compare:
         room = chosen("room", self.room, ROOMS)
         simulation = SimulationConfig(duration=self.duration, lidar=chosen("lidar", self.lidar, LIDARS))
         prepare_folder(self.output, overwrite=self.overwrite)
+        recording = self.output / "recording"
+        make_way(recording, overwrite=self.overwrite)
         with Interrupt() as interrupt, _Stages(interrupt) as stages:
             outcome = study(
                 room,
@@ -73,7 +75,7 @@ class Compare:
                 simulation=simulation,
                 noise_levels=() if self.no_noise_sweep else LEVELS,
                 details=not self.no_details,
-                recording=self.output / "recording",
+                recording=recording,
                 jobs=self.jobs or os.cpu_count() or 1,
                 observe=stages.observe,
             )
@@ -120,9 +122,7 @@ class _Stages:
 def _print_table(metrics: dict[str, Any]) -> None:
     """Print Table I: ours with corners only and with walls, and the paper's."""
     seeds = len(metrics["seeds"])
-    print(
-        f"RMSE in {metrics['room']}, mean over {seeds} seed{'s' if seeds > 1 else ''}; x and y in m, heading in rad\n"
-    )
+    print(f"RMSE in {metrics['room']}, mean over {seeds} drives; x and y in m, heading in rad\n")
     print(f"{'':<24}{'corners only':^26}{'with walls':^26}{'the paper':^26}")
     print(f"{'':<24}" + f"{'x':>8}{'y':>8}{'heading':>9} " * 3)
     walls = metrics["with_walls"]["detectors"]

@@ -1,6 +1,7 @@
 """What the commands say: results on standard output, everything about the work itself on standard error."""
 
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -105,13 +106,20 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         raise ResultError(f"{folder} is not empty; choose another folder with --output, or replace with --overwrite")
 
 
-def refuse_existing(path: Path, *, overwrite: bool) -> None:
-    """Keep a file that is there already.
+def make_way(path: Path, *, overwrite: bool) -> None:
+    """Remove a file or a rosbag2 folder that is to be written anew.
 
     Raises
     ------
     ResultError
-        If the file is there and `overwrite` is off.
+        If it is there and `overwrite` is off, or it is a folder of something else.
     """
-    if path.exists() and not overwrite:
+    if not path.exists():
+        return
+    if not overwrite:
         raise ResultError(f"{path} is there already; choose another --output, or replace it with --overwrite")
+    if not path.is_dir():
+        return  # replaced as a whole once the new one is written
+    if not (path / "metadata.yaml").is_file():
+        raise ResultError(f"{path} is a folder, and no recording; choose another --output")
+    shutil.rmtree(path)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from contourslam.cli.console import print_json, refuse_existing
+from contourslam.cli.console import make_way, print_json
 from contourslam.cli.options import Json, Overwrite, Settings
 from contourslam.config import Config
 from contourslam.errors import ConfigError, RecordingError
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Detect:
     """Draw one scan: its contours, the detector's response along them, corners and walls.
 
-    Example: contourslam detect run.mcap --scan 120 --detector wu -o scan.png
+    Example: contourslam detect out/room --scan 120 --detector wu -o scan.png
     """
 
     recording: tyro.conf.Positional[Path]
@@ -53,7 +53,7 @@ class Detect:
             raise ConfigError(f"{self.output}: a picture is a .png or .svg file")
         if self.scan < 0:
             raise ConfigError("--scan counts from 0")
-        refuse_existing(self.output, overwrite=self.overwrite)
+        make_way(self.output, overwrite=self.overwrite)
         detector = make_detector(self.settings.detector, adapted=self.settings.adapted)
         recording = open_recording(self.recording, scan_topic=self.scan_topic)
         scan, motion = _pick(recording, self.scan)

@@ -11,7 +11,12 @@ from contourslam.cli.options import Json
 from contourslam.errors import RecordingError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from contourslam.slam.result import RunResult
+
+    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Evaluate:
         if self.relations is None:
             return run_metrics(result, aligned=self.truth is not None)
         stamps, poses = read_relations(self.relations)
+        if stamps.max() < result.stamps.min() or stamps.min() > result.stamps.max():
+            raise _no_overlap(self.relations, stamps, result)
         return run_metrics(
             result,
             aligned=self.truth is not None,
@@ -72,11 +79,15 @@ def _with_truth(result: "RunResult", path: Path) -> "RunResult":
     truth = interpolate(stamps[order], poses[order], result.stamps)
     truth[(result.stamps < stamps.min()) | (result.stamps > stamps.max())] = np.nan
     if not np.isfinite(truth).any():
-        raise RecordingError(
-            f"{path}: its stamps, {stamps.min():.3f} to {stamps.max():.3f} s, do not overlap those of the run, "
-            f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s; do both use the same clock?"
-        )
+        raise _no_overlap(path, stamps, result)
     return replace(result, truth=truth)
+
+
+def _no_overlap(path: Path, stamps: "Floats", result: "RunResult") -> RecordingError:
+    return RecordingError(
+        f"{path}: its stamps, {stamps.min():.3f} to {stamps.max():.3f} s, do not overlap those of the run, "
+        f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s; do both use the same clock?"
+    )
 
 
 # What is printed: title, unit, and where it stands in the metrics.

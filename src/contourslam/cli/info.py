@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Info:
     """Say what is in a recording: topics, rates, beams, clocks, damage, and what is missing to map it.
 
-    Example: contourslam info run.mcap
+    Example: contourslam info out/room
     """
 
     recording: tyro.conf.Positional[Path]

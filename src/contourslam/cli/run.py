@@ -11,7 +11,7 @@ from contourslam.cli.console import complain, note, prepare_folder, print_json, 
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt, UntilStopped
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
 from contourslam.config import Config, SlamConfig
-from contourslam.errors import ConfigError
+from contourslam.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+_WARM_UP = 20  # scans
 DEFAULTS = Config(slam=SlamConfig(walls=True))
 """Walls are on: on real logs corners alone are too few."""
 
@@ -133,9 +134,17 @@ def _run(options: Run, command: str) -> int:
     )
     prepare_folder(options.output, overwrite=options.overwrite)
     reading = _Reading(recording, options)
+    mount = recording.lidar_mount
     with Interrupt() as interrupt:
-        messages = UntilStopped(reading.messages(options.max_scans), interrupt)
-        result = replay(progress(messages, "message"), options.settings, lidar_mount=recording.lidar_mount)
+        try:
+            # Compiling is no part of the time per scan, and takes as long as some thousand of them.
+            replay(UntilStopped(reading.messages(_WARM_UP), interrupt), options.settings, lidar_mount=mount)
+            messages = UntilStopped(reading.messages(options.max_scans), interrupt)
+            result = replay(progress(messages, "message"), options.settings, lidar_mount=mount)
+        except RecordingError:
+            if interrupt.requested:  # it holds no scan because we stopped before the first
+                raise KeyboardInterrupt from None
+            raise
     complete = result.complete and not messages.interrupted
     result = replace(result, complete=complete, skipped={**recording.skipped, **result.skipped})
     if len(result.stamps):

@@ -6,21 +6,22 @@ from typing import Annotated
 
 import tyro
 
-from contourslam.cli.console import Bar, chosen, note, print_json, refuse_existing
+from contourslam.cli.console import Bar, chosen, make_way, note, print_json
 from contourslam.cli.options import Json, Overwrite
 
 
 @dataclass(frozen=True)
 class Simulate:
-    """Simulate a robot in a room and record it: scans, wheel odometry and true poses in a rosbag2 MCAP file.
+    """Simulate a robot in a room and record it: scans, wheel odometry and true poses.
 
-    The same room, options and seed give the same recording. ROS 2 and Foxglove read it.
+    The recording is a rosbag2 folder with an MCAP file, which ROS 2 and Foxglove read. The same room, options and seed
+    give the same recording.
 
-    Example: contourslam simulate --room furnished_room --seed 1 -o run.mcap
+    Example: contourslam simulate --room furnished_room --seed 1 -o out/room
     """
 
-    output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE.mcap")]
-    """File to write."""
+    output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="DIR")]
+    """Folder of the recording to write."""
     overwrite: Overwrite = False
     room: str = "furnished_room"
     """Room to drive through: furnished_room, office_corridor or large_hall."""
@@ -50,7 +51,7 @@ class Simulate:
         config = SimulationConfig(
             duration=self.duration, speed=self.speed, noise=self.noise, lidar=chosen("lidar", self.lidar, LIDARS)
         )
-        refuse_existing(self.output, overwrite=self.overwrite)
+        make_way(self.output, overwrite=self.overwrite)
         with Bar("simulating") as bar:
             run = simulate(room, config, self.seed, progress=bar.to)
         write_recording(self.output, run.messages(), lidar_mount=tuple(run.lidar_mount.tolist()))

@@ -1,0 +1,66 @@
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from contourslam.cli import main
+from contourslam.recordings import open_recording
+from contourslam.scan import LaserScan, TruePose
+
+Failure = Callable[..., str]
+
+
+def test_a_simulated_recording_can_be_mapped_and_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "room"
+    assert main(["simulate", "-o", str(recording), "--duration", "4", "--seed", "3", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["recording"] == str(recording)
+    kinds = [type(message) for message in open_recording(recording).messages()]
+    assert kinds.count(LaserScan) == said["scans"] >= 38
+    assert TruePose in kinds
+    assert main(["run", str(recording), "-o", str(tmp_path / "out"), "--json"]) == 0
+    metrics = json.loads(capsys.readouterr().out)
+    assert metrics["rmse"]["x"] < 0.02
+    assert metrics["odometry_rmse"] is not None
+
+
+def test_the_same_seed_gives_the_same_scans_and_another_seed_others(tmp_path: Path) -> None:
+    runs = {}
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert main(["simulate", "-o", str(tmp_path / name), "--duration", "2", "--seed", str(seed)]) == 0
+        messages = open_recording(tmp_path / name).messages()
+        runs[name] = [message.ranges.tobytes() for message in messages if isinstance(message, LaserScan)]
+    assert runs["a"] == runs["b"]
+    assert runs["a"] != runs["c"]
+
+
+def test_the_x4_preset_gives_a_varying_number_of_beams(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "-o", str(tmp_path / "x4"), "--duration", "4", "--lidar", "ydlidar_x4"]
+    assert main(arguments) == 0
+    capsys.readouterr()
+    assert main(["info", str(tmp_path / "x4"), "--json"]) == 0
+    fewest, most = json.loads(capsys.readouterr().out)["scans"]["beams"]
+    assert fewest < most
+
+
+def test_an_unknown_room_lists_those_there_are(failure: Failure, tmp_path: Path) -> None:
+    said = failure("simulate", "-o", tmp_path / "x", "--room", "kitchen")
+    assert "furnished_room, office_corridor, large_hall" in said
+
+
+def test_an_unknown_lidar_lists_those_there_are(failure: Failure, tmp_path: Path) -> None:
+    assert "paper, ydlidar_x4" in failure("simulate", "-o", tmp_path / "x", "--lidar", "sick")
+
+
+def test_a_recording_that_is_there_is_replaced_only_if_asked(failure: Failure, tmp_path: Path) -> None:
+    arguments = ["simulate", "-o", str(tmp_path / "room"), "--duration", "1"]
+    assert main(arguments) == 0
+    assert "--overwrite" in failure(*arguments)
+    assert main([*arguments, "--overwrite"]) == 0
+
+
+def test_a_folder_that_is_no_recording_is_never_replaced(failure: Failure, tmp_path: Path) -> None:
+    (tmp_path / "precious.txt").write_text("mine")
+    assert "no recording" in failure("simulate", "-o", tmp_path, "--duration", "1", "--overwrite")
+    assert (tmp_path / "precious.txt").read_text() == "mine"
