@@ -45,8 +45,10 @@ def parse_plain_decimals(text: NDArray[np.uint8], powers: Floats, out: Floats) -
         while position < length and text[position] != 32 and text[position] != 9:
             code = text[position]
             if 48 <= code <= 57:
-                mantissa = 10 * mantissa + (code - 48)
                 digits += 1
+                if digits >= powers.size:
+                    return False
+                mantissa = 10 * mantissa + (code - 48)
                 if seen_point:
                     decimals += 1
             elif code == 46 and not seen_point:
@@ -54,7 +56,7 @@ def parse_plain_decimals(text: NDArray[np.uint8], powers: Floats, out: Floats) -
             else:
                 return False
             position += 1
-        if digits == 0 or digits >= powers.size:
+        if digits == 0:
             return False
         value = mantissa / powers[decimals]
         out[found] = -value if negative else value

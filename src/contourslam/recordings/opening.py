@@ -57,7 +57,7 @@ def _open_log(path: Path, head: bytes, scan: str | None, odometry: str | None, t
                 inner = b""
         if inner.startswith(_BAG_STARTS):
             raise RecordingError(f"{path}: a compressed rosbag; decompress it first")
-    elif b"\x00" in head:
+    elif b"\x00" in head.partition(b"\n")[0]:
         raise RecordingError(f"{path}: neither a rosbag (1, 2, mcap) nor a CARMEN log")
     if truth is not None or odometry not in (None, "ODOM"):
         raise RecordingError(f"{path}: a CARMEN log has no topics of odometry or true pose to choose from")

@@ -81,7 +81,8 @@ class IndexedStorage(Storage):
                 yield RawMessage(connection.topic, connection.msgtype, time, data)
                 found += 1
             for file in storage_files(self.path):
-                sqlite.check_journal(file)
+                if first_bytes(file, 16) == sqlite.MAGIC:
+                    sqlite.check_whole(file)
         except Exception as error:  # damage shows in rosbags as many kinds of exception
             raise RecordingError(
                 f"{self.path}: damaged after message {found} of {promised}: {reason(error)}"

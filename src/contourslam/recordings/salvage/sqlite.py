@@ -1,6 +1,7 @@
 """Rosbag2's sqlite3 files read row by row, not through their index."""
 
 import sqlite3
+import struct
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -21,11 +22,23 @@ def sqlite_messages(path: Path) -> Iterator[RawMessage]:
             if not (isinstance(time, int) and isinstance(data, bytes)):
                 raise DamagedError("a row does not hold a message")
             yield RawMessage(*topics[key], time, data)
-    check_journal(path)
+    check_whole(path)
 
 
-def check_journal(path: Path) -> None:
-    """Raise DamagedError where SQLite keeps the newest messages beside the file, in its write-ahead log."""
+def check_whole(path: Path) -> None:
+    """Raise DamagedError where rows may be missing that SQLite does not miss.
+
+    The file may be shorter than its header says (SQLite takes what is missing of its last page as zeros), or the newest
+    rows may still lie beside it, in the write-ahead log of a recorder that was killed.
+    """
+    with path.open("rb") as file:
+        header = file.read(100)
+    page_size, change, pages = struct.unpack_from(">H6xII", header, 16)
+    (valid_for,) = struct.unpack_from(">I", header, 92)
+    expected = pages * (65536 if page_size == 1 else page_size)
+    size = path.stat().st_size
+    if change == valid_for and size < expected:
+        raise DamagedError(f"it is cut short: {size} of {expected} bytes")
     journal = path.with_name(f"{path.name}-wal")
     if journal.exists() and journal.stat().st_size > 0:
         raise DamagedError(f"its newest messages are still in {journal.name}: open it once with sqlite3 to merge them")
