@@ -135,7 +135,8 @@ def segment(
         return Contours(np.empty((0, 2)), np.zeros(1, np.int64), np.zeros(0, np.bool_), 0.0, np.empty(0))
     points, bearings, beams = _in_order(points, bearings, beams)
     span = abs(float(bearings[-1] - bearings[0])) / max(int(beams[-1] - beams[0]), 1)
-    ring = span * (beam_count + 0.5) >= 2.0 * math.pi
+    # The turn rarely is a whole number of beams; the last gap may be as wide as any other that a contour goes on over.
+    ring = span * (beam_count + config.max_missing) >= 2.0 * math.pi
     if bearings[-1] < bearings[0]:
         points, bearings, beams = points[::-1], bearings[::-1], (beam_count - 1 - beams)[::-1]
     out, starts, closed = _segment(
