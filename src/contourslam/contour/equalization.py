@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contourslam.contour.contours import Contours, Floats, Ints
+from contourslam.errors import ConfigError
 from contourslam.kernels import kernel
 
 
@@ -116,6 +117,13 @@ def equalize(contours: Contours, spacing: float, *, average_below: float = 0.0) 
     -------
     Contours
         One contour for each raw contour; the pieces of one sum to its end-to-end vector.
+
+    Raises
+    ------
+    ConfigError
+        If `spacing` is not positive.
     """
+    if not spacing > 0.0:
+        raise ConfigError(f"the spacing of an equalized contour must be positive, got {spacing!r} m")
     points, starts, source = _equalize(contours.points, contours.starts, contours.closed, spacing, average_below)
     return Contours(points, starts, contours.closed, spacing, source)
