@@ -19,6 +19,9 @@ from contourslam.slam.observation import Observations
 
 AMBIGUITY_LEAD = 4.0  # a runner-up this much farther in squared Mahalanobis distance is e² times less likely
 
+UNKNOWN_CORNERS = 0.1  # corners not yet in the map, per m²; in range and bearing that is as many times the range
+UNKNOWN_WALLS = 1.0  # walls not yet in the map, per radian of direction and metre of distance
+
 Model = tuple[Floats, Floats, Floats]  # expected measurements and their Jacobians by pose and by landmark
 
 
@@ -109,8 +112,11 @@ def associate(seen: Observations, world: Floats, f: LandmarkFilter, model: Model
         nu = [innovation(f.table[j, KIND], seen.values[i], model[0][j]) for i, j in pairs]
         gates = np.array([0.0] + [chi_square_gate(config.gate_probability, 2 * m + 2) for m in range(len(seen))])
         innovations = np.array(nu, dtype=np.float64).reshape(-1, 2)
+        corner = world[:, look.KIND] == CORNER
+        per_unit = np.where(corner, UNKNOWN_CORNERS * np.maximum(seen.values[:, 0], 0.1), UNKNOWN_WALLS)
         return joint_compatibility(
-            len(seen), seen.noises, f.covariance, model[1], model[2], rows, landmarks, innovations, gates
-        )
+            len(seen), seen.noises, f.covariance, model[1], model[2], rows, landmarks, innovations, gates,
+            np.log(per_unit),
+        )  # fmt: skip
     lead = AMBIGUITY_LEAD if config.association == "mutual" else 0.0
     return assign_nearest(len(seen), f.count, rows, landmarks, distance, lead)

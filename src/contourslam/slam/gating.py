@@ -25,6 +25,8 @@ from contourslam.slam.measurement import (
 MAX_DIRECTION_DIFFERENCE = math.radians(40.0)
 MAX_OPENING_DIFFERENCE = math.radians(35.0)
 MAX_WALL_GAP = 0.5  # along a line, two pieces this close (m) may be one wall
+# A direction in doubt by more than this (rad) cannot be corrected by a linear filter, whatever it seems to match.
+LINEAR = 0.25
 REACH = 2.0  # no landmark farther than this (m) from where it is seen is considered at all
 
 
@@ -107,6 +109,9 @@ def compatible_pairs(
                 continue
             n0, n1 = innovation(table[j, KIND], values[i], expected[j])
             s = innovation_covariance(covariance, j, by_pose[j], by_landmark[j], noises[i])
+            angular = s[1, 1] if table[j, KIND] == CORNER else s[0, 0]
+            if angular > LINEAR * LINEAR:
+                continue
             determinant = s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
             d2 = (s[1, 1] * n0 * n0 - 2.0 * s[0, 1] * n0 * n1 + s[0, 0] * n1 * n1) / determinant
             if 0.0 <= d2 < gate:

@@ -1,11 +1,14 @@
 """Joint compatibility branch and bound (Neira and Tardos 2001): the largest set of pairs that agree with each other."""
 
+import math
+
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
 from contourslam.slam.ekf import covariance_block, landmark_columns
 
+LOG_TWO_PI = math.log(2.0 * math.pi)
 MOST_NODES = 20_000  # the search ends here with the best set so far
 
 
@@ -72,9 +75,12 @@ def _extend(lower: Floats, y: Floats, s: Floats, nu: Floats, order: Ints, depth:
 @kernel
 def joint_compatibility(
     k: int, noises: Floats, covariance: Floats, by_pose: Floats, by_landmark: Floats, seen: Ints, landmark: Ints,
-    innovations: Floats, gates: Floats,
+    innovations: Floats, gates: Floats, log_densities: Floats,
 ) -> Ints:  # fmt: skip
     """Largest jointly compatible set of pairs, of equally large ones the one of least joint distance.
+
+    A set must also be likelier than that all its observations are landmarks never seen before: where the pose is in
+    doubt by more than landmarks lie apart, one that falls inside the gate says nothing.
 
     Parameters
     ----------
@@ -87,6 +93,8 @@ def joint_compatibility(
     innovations : ndarray, shape (p, 2)
     gates : ndarray, shape (>= k + 1,)
         ``gates[m]`` is the chi-square gate for m pairs, 2 m degrees of freedom.
+    log_densities : ndarray, shape (k,)
+        Logarithm of how many unknown landmarks there are per unit of each observation's measurement.
 
     Returns
     -------
@@ -109,7 +117,7 @@ def joint_compatibility(
     # Depth-first over the observations: at level i try each pair of observation i, then "none of them".
     tried = np.empty(k + 1, dtype=np.int64)
     took = np.zeros(k + 1, dtype=np.bool_)
-    best_size, best_distance = 0, np.inf
+    best_size, best_distance, best_evidence = 0, np.inf, 0.0
     level, size, nodes = 0, 0, 0
     tried[0] = first[0]
     while level >= 0 and nodes < MOST_NODES:
@@ -119,6 +127,11 @@ def joint_compatibility(
                 distance += y[a] * y[a]
             if size > best_size or (size == best_size and distance < best_distance):
                 best_size, best_distance = size, distance
+                best_evidence = -distance
+                for a in range(2 * size):
+                    best_evidence -= 2.0 * math.log(lower[a, a])
+                for q in range(size):
+                    best_evidence -= 2.0 * (LOG_TWO_PI + log_densities[seen[order[q]]])
                 chosen[:] = -1
                 for q in range(size):
                     chosen[seen[order[q]]] = landmark[order[q]]
@@ -159,4 +172,6 @@ def joint_compatibility(
                 took[level] = False
         else:
             level -= 1
+    if best_evidence <= 0.0:  # twice the logarithm of the ratio of the two likelihoods
+        chosen[:] = -1
     return chosen

@@ -17,10 +17,15 @@ from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twi
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import predict_measurements
 from contourslam.slam.motion import motion_noise, predict
-from contourslam.slam.observation import observe, to_world
+from contourslam.slam.observation import Observations, observe, to_world
 from contourslam.slam.odometry_buffer import OdometryBuffer
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import expected_in_scan
+
+# Doubt that a slip of the wheels adds to the pose: half a metre, ten degrees. Three pairs at least must then agree, twice
+# as many numbers as a pose has.
+SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
+SLIP_PAIRS = 3
 
 
 def _no_lap(stage: str) -> None:
@@ -102,7 +107,7 @@ class ContourSlam:
         world = to_world(self.filter.mean[:3], self.mount, seen.looks)
         model = self._expect()
         self._lap("prediction")
-        chosen = associate(seen, world, self.filter, model, self.config.slam)
+        chosen = self._associate(seen, world, model)
         self._lap("association")
         matched = np.flatnonzero(chosen >= 0)
         nis = self._correct(matched, chosen[matched], seen.values, seen.noises, model)
@@ -154,6 +159,21 @@ class ContourSlam:
     def _expect(self) -> Model:
         f, first = self.filter, self.config.slam.first_estimates
         return predict_measurements(f.mean[:3], self.mount, f.mean, f.table, f.count, first)
+
+    def _associate(self, seen: Observations, world: Floats, model: Model) -> Ints:
+        """Associate; where little matches, ask whether more would if the wheels had slipped since the last scan."""
+        f, config = self.filter, self.config.slam
+        chosen = associate(seen, world, f, model, config)
+        matched = np.count_nonzero(chosen >= 0)
+        if config.association != "joint" or matched > 0.5 * len(seen) or len(seen) < SLIP_PAIRS:
+            return chosen
+        before = f.covariance[:3, :3].copy()
+        f.covariance[:3, :3] += SLIP
+        slipped = associate(seen, world, f, model, config)
+        if np.count_nonzero(slipped >= 0) >= max(matched + 2, SLIP_PAIRS):
+            return slipped
+        f.covariance[:3, :3] = before
+        return chosen
 
     def _correct(self, rows: Ints, landmarks: Ints, values: Floats, noises: Floats, model: Model) -> float:
         """All matched observations at once (eqs 25-27)."""
