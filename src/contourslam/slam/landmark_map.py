@@ -49,7 +49,7 @@ class WallMap:
     ids : ndarray of int, shape (w,)
         Identity, kept for life and never used again.
     end_points : ndarray, shape (w, 2, 2)
-        First and last point, m; seen from free space the wall runs from the left to the right.
+        First and last point, m; seen from free space the wall runs from the right to the left.
     end_point_covariances : ndarray, shape (w, 2, 2, 2)
         Covariance of each end point, m²; along the wall it is what the beam spacing leaves open.
     normals : ndarray, shape (w,)
