@@ -36,14 +36,15 @@ def test_the_map_shows_estimate_truth_and_raw_odometry_where_they_are(make_run):
     assert axes.get_aspect() == 1.0
 
 
-def test_the_ellipses_of_the_map_are_two_sigma_times_what_the_legend_says(make_run):
+@pytest.mark.parametrize(("sigma", "factor"), [(0.001, 50), (0.01, 10), (0.05, 2), (0.5, 1)])
+def test_the_ellipses_of_the_map_are_two_sigma_times_what_the_legend_says(make_run, sigma, factor):
     run = make_run()
-    run.corner_map.covariances[:] = np.diag([0.01**2, 0.02**2])
+    run.corner_map.covariances[:] = np.diag([0.5 * sigma, sigma]) ** 2
     figure = world_figure(run)
     (ellipses,) = figure.findobj(matplotlib.collections.EllipseCollection)
-    assert "10× enlarged" in texts(figure)
-    widths, heights = ellipses.get_widths(), ellipses.get_heights()
-    np.testing.assert_allclose(np.sort([widths[0], heights[0]]), [2 * 2 * 0.01 * 10, 2 * 2 * 0.02 * 10])
+    assert (f"{factor}× enlarged" in texts(figure)) == (factor > 1)
+    axes_lengths = np.sort([ellipses.get_widths()[0], ellipses.get_heights()[0]])
+    np.testing.assert_allclose(axes_lengths, [2 * sigma * factor, 4 * sigma * factor])
 
 
 def test_an_interrupted_run_is_marked_in_the_picture(make_run):

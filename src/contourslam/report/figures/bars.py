@@ -11,7 +11,8 @@ from contourslam.report.figures.style import BLUE, FAINT, GREY, INK, ORANGE, col
 Floats = NDArray[np.float64]
 
 _MARKERS = "osD^v"
-_STAGES = ("#0072b2", "#56b4e9", "#009e73", "#f0e442", "#e69f00", "#d55e00", "#aa4499", "#999999")
+# Tol's muted scheme (2021): ten stages that the colour-blind, too, can tell apart.
+_STAGES = ["#332288", "#88ccee", "#44aa99", "#117733", "#999933", "#ddcc77", "#cc6677", "#882255", "#aa4499", "#767676"]
 
 
 @styled

@@ -101,12 +101,19 @@ def draw_walls(axes: Axes, walls: WallMap) -> None:
         axes.add_collection(lines)
 
 
-def draw_corners(axes: Axes, corners: CornerMap, *, enlarged: float = 10.0) -> None:
-    """Draw the corners of a map, each with its two-sigma ellipse, which is millimetres wide and so enlarged."""
+def _enlargement(radius: float) -> int:
+    """Find a round factor that makes a typical ellipse of this radius (m) a quarter of a metre large, at most."""
+    return max((factor for factor in (1, 2, 5, 10, 20, 50) if factor * radius <= 0.25), default=1)
+
+
+def draw_corners(axes: Axes, corners: CornerMap) -> None:
+    """Draw the corners of a map, each with its two-sigma ellipse, enlarged so that it can be seen."""
     if not len(corners.ids):
         return
     variances, vectors = np.linalg.eigh(corners.covariances)
-    widths = 4.0 * enlarged * np.sqrt(np.maximum(variances, 0.0))
+    sigmas = np.sqrt(np.maximum(variances, 0.0))
+    enlarged = _enlargement(2.0 * float(np.median(sigmas[:, 1])))
+    widths = 4.0 * enlarged * sigmas
     angles = np.degrees(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0]))
     ellipses = EllipseCollection(
         widths[:, 0],
@@ -121,7 +128,7 @@ def draw_corners(axes: Axes, corners: CornerMap, *, enlarged: float = 10.0) -> N
         zorder=4,
     )
     axes.add_collection(ellipses)
-    name = f"2σ of a corner, {enlarged:.0f}× enlarged"
+    name = "2σ of a corner" + (f", {enlarged}× enlarged" if enlarged > 1 else "")
     axes.plot([], [], "o", markersize=9, markerfacecolor="none", markeredgecolor=VERMILION, label=name)
     for filled, name in ((True, "mapped corner, convex"), (False, "mapped corner, concave")):
         chosen = corners.convex == filled
