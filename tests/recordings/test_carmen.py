@@ -54,18 +54,13 @@ def test_every_line_of_the_real_logs_is_read(
     assert (recording.start, recording.end) == (min(stamps), max(stamps))
 
 
-def test_stamps_that_run_backwards_keep_the_order_of_the_file(shared_data: Path) -> None:
-    messages = open_recording(shared_data / "intel" / "intel.log.xz").messages()
-    stamps = np.array([message.stamp for message in messages if isinstance(message, LaserScan)])
-    assert (np.diff(stamps) < 0).sum() > 100
-
-
-def test_scans_are_read_faster_than_the_filter_needs_them(shared_data: Path) -> None:
-    """At least 5,000 scans a second of processor time, half of what an idle machine reaches, so that it holds in CI."""
+def test_stamps_that_run_backwards_keep_the_order_of_the_file_and_reading_is_fast(shared_data: Path) -> None:
+    """At least 4,000 scans a second of processor time, less than half of what an idle machine reaches."""
     recording = open_recording(shared_data / "intel" / "intel.log.xz")
     began = time.process_time()
-    count = sum(isinstance(message, LaserScan) for message in recording.messages())
-    assert count / (time.process_time() - began) > 5000
+    stamps = np.array([message.stamp for message in recording.messages() if isinstance(message, LaserScan)])
+    assert stamps.size / (time.process_time() - began) > 4000
+    assert (np.diff(stamps) < 0).sum() > 100
 
 
 @pytest.mark.parametrize("count", [180, 360, 181, 361, 90, 541])

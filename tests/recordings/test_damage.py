@@ -19,14 +19,14 @@ LONE = ("bag1", "bag1_bz2", "bag1_lz4", "lone_mcap", "lone_db3", "zstd_mcap")
 FUZZ = settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.differing_executors],
     deadline=None,
-    max_examples=25,
+    max_examples=20,
 )
 
 
 @pytest.fixture(scope="module")
 def many_messages(make_messages: Callable[[int], list[Message]]) -> list[Message]:
     """Enough for several chunks of a megabyte."""
-    return make_messages(1500)
+    return make_messages(1100)
 
 
 @pytest.fixture(scope="module")

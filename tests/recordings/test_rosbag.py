@@ -182,6 +182,23 @@ def test_no_transform_is_no_mount_and_is_mentioned(
     assert recording.lidar_mount is None and "no transform" in recording.notes[0]
 
 
+def test_a_transform_that_is_no_motion_is_passed_over(
+    messages: list[Message], encoder: Encoder, open_entries: Callable[..., Recording]
+) -> None:
+    corrupt = encoder.transform(1.0, np.zeros(3), "base_link", "laser")
+    corrupt.transforms[0].transform.rotation.x = 1e300
+    far = encoder.transform(1.0, np.array([math.inf, 0.0, 0.0]), "base_link", "laser")
+    good = encoder.transform(1.0, np.array([0.5, 0.0, 0.0]), "base_link", "laser")
+    recording = open_entries(
+        [
+            *(("/tf_static", 1.0, message) for message in (corrupt, far, good)),
+            ("/odom", 1.0, encoder.odometry(1.0, np.zeros(3), "odom", "base_link")),
+            ("/scan", 1.0, encoder.scan(_a_scan(messages), "laser")),
+        ]
+    )
+    assert recording.lidar_mount == pytest.approx((0.5, 0.0, 0.0))
+
+
 def test_beam_times_come_from_the_time_of_the_whole_scan_where_no_other_is_given(
     messages: list[Message], encoder: Encoder, open_entries: Callable[..., Recording]
 ) -> None:

@@ -72,7 +72,7 @@ def test_the_order_is_kept_where_stamps_run_backwards_or_repeat(tmp_path: Path, 
     stamps = [10.0, 9.0, 9.0, 11.0, 2.0]
     write_recording(tmp_path / "run", [a_scan(5.0), *(Odometry(stamp, np.zeros(3)) for stamp in stamps)])
     assert [message.stamp for message in open_recording(tmp_path / "run").messages()] == [5.0, *stamps]
-    readings = list(itertools.islice(log.messages(), 5000, 7000))
+    readings = list(itertools.islice(log.messages(), 5000, 6000))
     assert (np.diff([message.stamp for message in readings]) < 0).any()
     write_recording(tmp_path / "intel", readings)
     copy = open_recording(tmp_path / "intel").messages()

@@ -1,5 +1,6 @@
 """Where the lidar sits on the robot, out of a recording's transforms."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,8 @@ from contourslam.recordings.ros_messages import frame_name
 Floats = NDArray[np.float64]
 
 _BASES = ("base_link", "base_footprint")
+# No robot is larger, m.
+_LARGEST = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +42,12 @@ class FrameTree:
         self._parents: dict[str, tuple[str, Floats]] = {}
 
     def add(self, transforms: list[Any]) -> None:
-        """Add the transforms of a ``TFMessage``; the first one for a frame counts."""
+        """Add the transforms of a ``TFMessage``; the first for a frame counts, and one that is no motion does not."""
         for stamped in transforms:
             child, parent = frame_name(stamped.child_frame_id), frame_name(stamped.header.frame_id)
-            self._parents.setdefault(child, (parent, _matrix(stamped.transform)))
+            matrix = _matrix(stamped.transform)
+            if matrix is not None:
+                self._parents.setdefault(child, (parent, matrix))
 
     def mount(self, lidar_frame: str, odometry_child: str) -> Mount | None:
         """Find the lidar in the base frame: the one that the odometry speaks of, or else one of the usual names."""
@@ -52,8 +57,6 @@ class FrameTree:
             common = next((frame for frame in lidar if frame in up_from_base), None)
             if base and common is not None:
                 matrix = np.linalg.inv(up_from_base[common]) @ lidar[common]
-                if not np.isfinite(matrix).all():
-                    return None
                 yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
                 return Mount(base, (float(matrix[0, 3]), float(matrix[1, 3]), yaw), bool(matrix[2, 2] < 0.0))
         return None
@@ -71,10 +74,13 @@ class FrameTree:
         return found
 
 
-def _matrix(transform: Any) -> Floats:
-    """4 by 4 matrix of a transform message."""
+def _matrix(transform: Any) -> Floats | None:
+    """4 by 4 matrix of a transform message; None for corrupt values."""
     q, t = transform.rotation, transform.translation
-    x, y, z, w = np.array([q.x, q.y, q.z, q.w]) / (np.linalg.norm([q.x, q.y, q.z, q.w]) or 1.0)
+    length = math.hypot(q.x, q.y, q.z, q.w)
+    if not (abs(length - 1.0) < 0.1 and math.hypot(t.x, t.y, t.z) < _LARGEST):  # so that NaN is refused too
+        return None
+    x, y, z, w = q.x / length, q.y / length, q.z / length, q.w / length
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), t.x],

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from contourslam.errors import RecordingError
+from contourslam.recordings.ros_messages import standard_types
 from contourslam.scan import LaserScan
 
 # What single precision and a lidar's own resolution leave of an angle, rad, and a generous bound for a beam's time, s.
@@ -17,9 +18,7 @@ class Encoder:
     """Builds standard messages (definitions of ROS 2 Humble; later ones are the same on the wire)."""
 
     def __init__(self) -> None:
-        from rosbags.typesys import Stores, get_typestore
-
-        self.store = get_typestore(Stores.ROS2_HUMBLE)
+        self.store = standard_types()
         self._types = self.store.types
 
     def serialize(self, message: Any) -> bytes:

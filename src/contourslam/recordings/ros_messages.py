@@ -6,13 +6,17 @@ carry none, and a bag's other messages may be of any type.
 
 import math
 from collections.abc import Callable
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contourslam.errors import ScanError
 from contourslam.recordings.salvage import RawMessage
 from contourslam.scan import LaserScan, Odometry, TruePose, evenly_spaced
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -27,17 +31,23 @@ OLD_TRANSFORMS = "tf/msg/tfMessage"
 _LARGEST = 1e9
 
 
-def message_decoder(ros1: bool) -> Callable[[RawMessage], Any]:
-    """Make the function that deserializes a raw message; it may raise any exception on corrupt bytes."""
+@lru_cache
+def standard_types(ros1: bool = False) -> "Typestore":
+    """Definitions of the standard messages; built once, as that takes a tenth of a second."""
     from rosbags.typesys import Stores, get_typestore
 
-    ros2_store = get_typestore(Stores.ROS2_HUMBLE)
     if not ros1:
-        return lambda raw: ros2_store.deserialize_cdr(raw.data, raw.message_type)
+        return get_typestore(Stores.ROS2_HUMBLE)
     store = get_typestore(Stores.ROS1_NOETIC)
-    definition = ros2_store.fielddefs[TRANSFORMS]
+    definition = standard_types().fielddefs[TRANSFORMS]
     store.register({TRANSFORMS: definition, OLD_TRANSFORMS: definition})
-    return lambda raw: store.deserialize_ros1(raw.data, raw.message_type)
+    return store
+
+
+def message_decoder(ros1: bool) -> Callable[[RawMessage], Any]:
+    """Make the function that deserializes a raw message; it may raise any exception on corrupt bytes."""
+    deserialize = standard_types().deserialize_cdr if not ros1 else standard_types(ros1=True).deserialize_ros1
+    return lambda raw: deserialize(raw.data, raw.message_type)
 
 
 def stamp_of(header: Any) -> float:
