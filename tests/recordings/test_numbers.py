@@ -30,7 +30,7 @@ def test_the_kernel_does_as_its_plain_twin(text: str, count: int) -> None:
     codes = np.frombuffer(text.encode(), dtype=np.uint8)
     compiled, plain = np.zeros(count), np.zeros(count)
     # Python integers, as NumPy's eight-bit ones would wrap where the compiled ones do not.
-    twin = parse_plain_decimals.py_func(codes.astype(np.int64), _POWERS, plain)  # type: ignore[attr-defined]
+    twin = parse_plain_decimals.py_func(codes.astype(np.int64), _POWERS, plain)
     assert parse_plain_decimals(codes, _POWERS, compiled) == twin
     if twin:
         assert np.array_equal(compiled, plain)
