@@ -116,7 +116,7 @@ def associate(seen: Observations, world: Floats, f: LandmarkFilter, model: Model
         per_unit = np.where(corner, UNKNOWN_CORNERS * np.maximum(seen.values[:, 0], 0.1), UNKNOWN_WALLS)
         return joint_compatibility(
             len(seen), seen.noises, f.covariance, model[1], model[2], rows, landmarks, innovations, gates,
-            np.log(per_unit),
+            np.log(per_unit), corner,
         )  # fmt: skip
     lead = AMBIGUITY_LEAD if config.association == "mutual" else 0.0
     return assign_nearest(len(seen), f.count, rows, landmarks, distance, lead)

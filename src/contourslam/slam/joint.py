@@ -3,11 +3,14 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
 from contourslam.slam.ekf import covariance_block, landmark_columns
 
+# A single pair has no other to agree with: its direction must be known this well (rad) beforehand.
+ALONE = 0.12
 LOG_TWO_PI = math.log(2.0 * math.pi)
 MOST_NODES = 20_000  # the search ends here with the best set so far
 
@@ -75,7 +78,7 @@ def _extend(lower: Floats, y: Floats, s: Floats, nu: Floats, order: Ints, depth:
 @kernel
 def joint_compatibility(
     k: int, noises: Floats, covariance: Floats, by_pose: Floats, by_landmark: Floats, seen: Ints, landmark: Ints,
-    innovations: Floats, gates: Floats, log_densities: Floats,
+    innovations: Floats, gates: Floats, log_densities: Floats, corner: NDArray[np.bool_],
 ) -> Ints:  # fmt: skip
     """Largest jointly compatible set of pairs, of equally large ones the one of least joint distance.
 
@@ -95,6 +98,8 @@ def joint_compatibility(
         ``gates[m]`` is the chi-square gate for m pairs, 2 m degrees of freedom.
     log_densities : ndarray, shape (k,)
         Logarithm of how many unknown landmarks there are per unit of each observation's measurement.
+    corner : ndarray of bool, shape (k,)
+        Whether the observation is a corner, whose angle is the second number, or a wall, where it is the first.
 
     Returns
     -------
@@ -118,6 +123,7 @@ def joint_compatibility(
     tried = np.empty(k + 1, dtype=np.int64)
     took = np.zeros(k + 1, dtype=np.bool_)
     best_size, best_distance, best_evidence = 0, np.inf, 0.0
+    best_angular = 0.0
     level, size, nodes = 0, 0, 0
     tried[0] = first[0]
     while level >= 0 and nodes < MOST_NODES:
@@ -128,6 +134,10 @@ def joint_compatibility(
             if size > best_size or (size == best_size and distance < best_distance):
                 best_size, best_distance = size, distance
                 best_evidence = -distance
+                if size == 1:
+                    q = order[0]
+                    a = 2 * q + (1 if corner[seen[q]] else 0)
+                    best_angular = s[a, a]
                 for a in range(2 * size):
                     best_evidence -= 2.0 * math.log(lower[a, a])
                 for q in range(size):
@@ -172,6 +182,8 @@ def joint_compatibility(
                 took[level] = False
         else:
             level -= 1
+    if best_size == 1 and best_angular > ALONE * ALONE:
+        chosen[:] = -1
     if best_evidence <= 0.0:  # twice the logarithm of the ratio of the two likelihoods
         chosen[:] = -1
     return chosen

@@ -22,8 +22,8 @@ from contourslam.slam.odometry_buffer import OdometryBuffer
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import expected_in_scan
 
-# Doubt that a slip of the wheels adds to the pose: half a metre, ten degrees. Three pairs at least must then agree, twice
-# as many numbers as a pose has.
+# Doubt that a slip of the wheels adds to the pose: half a metre, ten degrees. At least three pairs must then agree,
+# twice as many numbers as a pose has.
 SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
 SLIP_PAIRS = 3
 
