@@ -82,7 +82,10 @@ def test_the_occupancy_grid_lies_under_the_map_where_it_belongs(make_run):
     grid.add(np.array([[0.1, 0.1]]), np.array([[5.9, 3.9]]))
     (image,) = world_figure(make_run(), grid=grid).axes[0].get_images()
     assert image.get_extent() == [0.0, 6.0, 0.0, 4.0]
-    assert image.origin == "upper"
+    assert image.origin == "lower"
+    colours = image.get_array()
+    assert colours[0, 0].tolist() == [255, 255, 255]  # free: the beam began here
+    assert (colours[-1, -1] < 100).all()  # occupied: it ended here
 
 
 def test_the_errors_are_wrapped_and_bounded_by_two_sigma(make_run):

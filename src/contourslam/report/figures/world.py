@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from contourslam.report.figures.style import BLUE, FAINT, GREY, INK, ORANGE, VERMILION, label, styled
-from contourslam.report.nav2_map import pgm_pixels
-from contourslam.report.occupancy import OccupancyGrid
+from contourslam.report.occupancy import FREE, OCCUPIED, OccupancyGrid
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 
@@ -55,7 +54,8 @@ def world_figure(
         cells, (x, y) = grid.cells()
         rows, columns = cells.shape
         extent = (x, x + columns * grid.resolution, y, y + rows * grid.resolution)
-        axes.imshow(pgm_pixels(cells), cmap="gray", vmin=-300, vmax=254, extent=extent, interpolation="nearest")
+        # As colours and not as numbers: scaled down, thin walls are averaged and not lost.
+        axes.imshow(_colours(cells), extent=extent, interpolation="antialiased", origin="lower")
     _draw_room(axes, segments, circles)
     if len(result.stamps):
         _draw_way(axes, result)
@@ -70,6 +70,12 @@ def world_figure(
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower left", ncols=3)
     return figure
+
+
+def _colours(cells: NDArray[np.int8]) -> NDArray[np.uint8]:
+    """Red, green, blue of each cell: dark occupied, white free, light grey unknown."""
+    grey = np.where(cells == OCCUPIED, 60, np.where(cells == FREE, 255, 228)).astype(np.uint8)
+    return np.repeat(grey[:, :, None], 3, axis=2)
 
 
 def _thinned(points: Floats) -> Floats:
