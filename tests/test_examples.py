@@ -1,0 +1,23 @@
+"""The examples run as they stand, without a warning."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+# What each must say, so that an example that runs and finds nothing does not pass.
+SAYS = {
+    "01_corners_of_one_scan.py": "curvature_scale_space: 6 corners",
+    "02_streaming_slam.py": "map: ",
+    "04_map_a_recording.py": "map.geojson, map.pgm, map.png, map.yaml",
+    "05_compare_two_detectors.py": "teh_chin        walls",
+}
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("[0-9]*.py")), ids=lambda path: path.stem)
+def test_the_example_runs(path: Path) -> None:
+    done = subprocess.run([sys.executable, "-W", "error", str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert SAYS[path.name] in done.stdout
