@@ -123,7 +123,7 @@ def test_the_covariance_of_a_new_landmark_is_that_of_sampled_ones(
     filter_.covariance[:3, :3] = root @ root.T
     filter_.add(mount, seen, 0)
     anchor = filter_.table[0, ANCHOR_X : ANCHOR_Y + 1]
-    n = 20_000
+    n = 8_000
     starts = pose + rng.normal(size=(n, 3)) @ root.T
     values = rng.multivariate_normal(seen.values[0], seen.noises[0], n)
     samples = np.empty((n, 5))
@@ -136,7 +136,7 @@ def test_the_covariance_of_a_new_landmark_is_that_of_sampled_ones(
         samples[i] = [*starts[i], *placed]
     sampled = np.cov(samples.T)
     scale = np.sqrt(np.outer(np.diag(sampled), np.diag(sampled)))
-    np.testing.assert_allclose(full(filter_) / scale, sampled / scale, atol=0.03)
+    np.testing.assert_allclose(full(filter_) / scale, sampled / scale, atol=0.04)
 
 
 def test_the_state_grows_past_its_room_and_loses_nothing(
