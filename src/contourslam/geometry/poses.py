@@ -1,9 +1,12 @@
 """Poses in the plane, SE(2): rows of x (m), y (m), heading (rad); every function takes one pose or an array of them."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.geometry.angles import wrap
+from contourslam.geometry.angles import wrap, wrap_angle
+from contourslam.kernels import kernel
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +51,40 @@ def between(first: Floats, second: Floats) -> Floats:
     cos, sin = np.cos(first[..., 2]), np.sin(first[..., 2])
     dx, dy = second[..., 0] - first[..., 0], second[..., 1] - first[..., 1]
     return np.stack([cos * dx + sin * dy, -sin * dx + cos * dy, wrap(second[..., 2] - first[..., 2])], axis=-1)
+
+
+@kernel
+def compose_one(first: Floats, second: Floats) -> Floats:
+    """:func:`compose` for single poses of shape (3,): a kernel, for loops and for what runs once a scan."""
+    cos, sin = math.cos(first[2]), math.sin(first[2])
+    out = np.empty(3)
+    out[0] = first[0] + cos * second[0] - sin * second[1]
+    out[1] = first[1] + sin * second[0] + cos * second[1]
+    out[2] = wrap_angle(first[2] + second[2])
+    return out
+
+
+@kernel
+def between_one(first: Floats, second: Floats) -> Floats:
+    """:func:`between` for single poses of shape (3,): a kernel, for loops and for what runs once a scan."""
+    cos, sin = math.cos(first[2]), math.sin(first[2])
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    out = np.empty(3)
+    out[0], out[1], out[2] = cos * dx + sin * dy, -sin * dx + cos * dy, wrap_angle(second[2] - first[2])
+    return out
+
+
+@kernel
+def interpolate_one(stamps: Floats, poses: Floats, wanted: float, clamped: bool) -> Floats:
+    """:func:`interpolate` for one time: a kernel; not `clamped`, it goes on at the twist of the nearest readings."""
+    n = stamps.size
+    if n == 1:
+        return poses[0].copy()
+    i = min(max(np.searchsorted(stamps, wanted, side="right") - 1, 0), n - 2)
+    weight = (wanted - stamps[i]) / max(stamps[i + 1] - stamps[i], 1e-12)
+    if clamped:
+        weight = min(max(weight, 0.0), 1.0)
+    return compose_one(poses[i], between_one(poses[i], poses[i + 1]) * weight)
 
 
 def inverse(pose: Floats) -> Floats:

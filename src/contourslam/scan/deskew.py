@@ -6,11 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap_angle
-from contourslam.geometry.poses import between, compose
+from contourslam.geometry.poses import between_one, compose_one, interpolate_one
 from contourslam.kernels import kernel
 from contourslam.scan.laser_scan import LaserScan
 
 Floats = NDArray[np.float64]
+
+
+@kernel
+def _lidar_motion(times: Floats, base_poses: Floats, T_base_lidar: Floats) -> Floats:
+    """Poses of the lidar at `times`, seen from where it is at time 0."""
+    motion = np.zeros((times.size, 3))
+    if times.size < 2:
+        return motion
+    start = compose_one(interpolate_one(times, base_poses, 0.0, False), T_base_lidar)
+    for k in range(times.size):
+        motion[k] = between_one(start, compose_one(base_poses[k], T_base_lidar))
+    return motion
 
 
 @kernel
@@ -72,12 +84,5 @@ def deskew(
     beams : ndarray of int, shape (m,)
         Beam number of each point.
     """
-    motion = np.zeros((len(times), 3))
-    if len(times) > 1:
-        lidar = compose(base_poses, T_base_lidar)
-        index = min(max(int(np.searchsorted(times, 0.0, side="right")) - 1, 0), len(times) - 2)
-        span = times[index + 1] - times[index]
-        weight = -times[index] / span if span > 0.0 else 0.0
-        start = compose(lidar[index], between(lidar[index], lidar[index + 1]) * weight)
-        motion = between(start, lidar)
+    motion = _lidar_motion(times, base_poses, T_base_lidar)
     return _deskew(scan.ranges, scan.angles, scan.offsets, valid, times, motion)

@@ -10,11 +10,11 @@ from contourslam.config import SlamConfig
 from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
 from contourslam.slam import observation as look
-from contourslam.slam.gates import chi_square_gate
+from contourslam.slam.gates import chi_square_gate, joint_gates
 from contourslam.slam.gating import compatible_pairs, looks_alike, offset_from
 from contourslam.slam.joint import joint_compatibility
 from contourslam.slam.landmark_filter import LandmarkFilter
-from contourslam.slam.measurement import CORNER, KIND, innovation
+from contourslam.slam.measurement import CORNER, KIND
 from contourslam.slam.observation import Observations
 
 AMBIGUITY_LEAD = 4.0  # a runner-up this much farther in squared Mahalanobis distance is e² times less likely
@@ -104,14 +104,11 @@ def associate(seen: Observations, world: Floats, f: LandmarkFilter, model: Model
     if config.association == "nearest":
         return nearest_within(world, f.mean, f.table, f.count, config.nearest_threshold)
     gate = chi_square_gate(config.gate_probability, 2)
-    rows, landmarks, distance, _ = compatible_pairs(
+    rows, landmarks, distance, innovations = compatible_pairs(
         seen.values, seen.noises, world, f.mean, f.covariance, f.table, f.count, *model, gate
     )
     if config.association == "joint":
-        pairs = zip(rows, landmarks, strict=True)
-        nu = [innovation(f.table[j, KIND], seen.values[i], model[0][j]) for i, j in pairs]
-        gates = np.array([0.0] + [chi_square_gate(config.gate_probability, 2 * m + 2) for m in range(len(seen))])
-        innovations = np.array(nu, dtype=np.float64).reshape(-1, 2)
+        gates = joint_gates(config.gate_probability, len(seen))
         corner = world[:, look.KIND] == CORNER
         per_unit = np.where(corner, UNKNOWN_CORNERS * np.maximum(seen.values[:, 0], 0.1), UNKNOWN_WALLS)
         return joint_compatibility(

@@ -3,6 +3,9 @@
 import math
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contourslam.errors import ConfigError
 
 
@@ -35,3 +38,9 @@ def chi_square_gate(probability: float, dof: int) -> float:
             tail += term
         low, high = (middle, high) if 1.0 - tail < probability else (low, middle)
     return high
+
+
+@lru_cache(maxsize=256)
+def joint_gates(probability: float, most: int) -> NDArray[np.float64]:
+    """Gates for 0 to `most` landmarks at once, shape (most + 1,); that for none is zero."""
+    return np.array([0.0] + [chi_square_gate(probability, 2 * m) for m in range(1, most + 1)])

@@ -92,12 +92,11 @@ def compatible_pairs(
     seen, landmark : ndarray of int, shape (p,)
     distance : ndarray, shape (p,)
         Squared Mahalanobis distance of the innovation, below `gate`.
-    offset : ndarray, shape (p,)
-        Distance in the world, m.
+    innovations : ndarray, shape (p, 2)
     """
     k = values.shape[0]
     seen, landmark = np.empty(k * count, dtype=np.int64), np.empty(k * count, dtype=np.int64)
-    distance, offset = np.empty(k * count), np.empty(k * count)
+    distance, innovations = np.empty(k * count), np.empty((k * count, 2))
     found = 0
     for i in range(k):
         for j in range(count):
@@ -115,6 +114,7 @@ def compatible_pairs(
             determinant = s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
             d2 = (s[1, 1] * n0 * n0 - 2.0 * s[0, 1] * n0 * n1 + s[0, 0] * n1 * n1) / determinant
             if 0.0 <= d2 < gate:
-                seen[found], landmark[found], distance[found], offset[found] = i, j, d2, apart
+                seen[found], landmark[found], distance[found] = i, j, d2
+                innovations[found, 0], innovations[found, 1] = n0, n1
                 found += 1
-    return seen[:found], landmark[:found], distance[:found], offset[:found]
+    return seen[:found], landmark[:found], distance[:found], innovations[:found]

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.geometry.angles import wrap
+from contourslam.geometry.angles import wrap, wrap_angle
+from contourslam.kernels import kernel
 from contourslam.slam import ekf
 from contourslam.slam import observation as look
 from contourslam.slam.landmark_map import CornerMap, WallMap
@@ -27,6 +28,32 @@ from contourslam.slam.measurement import (
 from contourslam.slam.observation import Observations, to_world
 
 END_POINT_SIGMA = 0.05  # along a wall its end is known no better than this, m
+
+
+@kernel
+def _sides_by_way(world: Floats) -> tuple[float, float]:
+    """Lengths of a corner's sides at direction -opening/2 and +opening/2; observed is the contour's order."""
+    # Along the contour matter lies to the right: at a convex corner the second side is the one at +opening/2.
+    first, second = world[look.X2], world[look.Y2]
+    return (first, second) if world[look.CONVEX] > 0.5 else (second, first)
+
+
+@kernel
+def _refresh(mean: Floats, table: Floats, observed: Ints, landmarks: Ints, world: Floats) -> None:
+    for k in range(landmarks.size):
+        i = landmarks[k]
+        row, seen = table[i], world[k]
+        if row[KIND] == CORNER:
+            weight = 1.0 / min(observed[i] + 1.0, 20.0)
+            row[DIRECTION] = wrap_angle(row[DIRECTION] + weight * wrap_angle(seen[look.DIRECTION] - row[DIRECTION]))
+            row[OPENING] += weight * (seen[look.OPENING] - row[OPENING])
+            first, last = _sides_by_way(seen)
+            row[START], row[END] = max(row[START], first), max(row[END], last)
+        else:
+            tx, ty = -math.sin(mean[3 + 2 * i]), math.cos(mean[3 + 2 * i])
+            first = tx * (seen[look.X1] - row[ANCHOR_X]) + ty * (seen[look.Y1] - row[ANCHOR_Y])
+            last = tx * (seen[look.X2] - row[ANCHOR_X]) + ty * (seen[look.Y2] - row[ANCHOR_Y])
+            row[START], row[END] = min(row[START], first), max(row[END], last)
 
 
 class LandmarkFilter:
@@ -79,7 +106,8 @@ class LandmarkFilter:
     @property
     def pose_covariance(self) -> Floats:
         """Full covariance of the pose, shape (3, 3)."""
-        return ekf.symmetric(self.covariance, 3)
+        p = self.covariance
+        return np.array([[p[0, 0], p[1, 0], p[2, 0]], [p[1, 0], p[1, 1], p[2, 1]], [p[2, 0], p[2, 1], p[2, 2]]])
 
     def add(self, mount: Floats, seen: Observations, index: int) -> int:
         """Bring observation `index` into the state as a new landmark with full cross-covariance; returns its id."""
@@ -100,7 +128,7 @@ class LandmarkFilter:
             by_measurement = np.array([[cos, -r * sin], [sin, r * cos]])
             row[DIRECTION], row[OPENING] = wrap(world[look.DIRECTION]), world[look.OPENING]
             row[CONVEX] = world[look.CONVEX]
-            row[START], row[END] = self._sides_by_way(world)
+            row[START], row[END] = _sides_by_way(world)
         else:
             a, b = float(wrap(heading + seen.values[index, 0])), 0.0
             nx, ny = math.cos(a), math.sin(a)
@@ -123,28 +151,9 @@ class LandmarkFilter:
         self.next_id += 1
         return self.next_id - 1
 
-    @staticmethod
-    def _sides_by_way(world: Floats) -> tuple[float, float]:
-        """Lengths of the sides at direction -opening/2 and +opening/2; observed is the contour's order."""
-        # Along the contour matter lies to the right: at a convex corner the second side is the one at +opening/2.
-        first, second = float(world[look.X2]), float(world[look.Y2])
-        return (first, second) if world[look.CONVEX] > 0.5 else (second, first)
-
-    def refresh(self, index: int, world: Floats) -> None:
-        """Let a sighting update what the filter does not estimate: a corner's looks, a wall's extent."""
-        row = self.table[index]
-        if row[KIND] == CORNER:
-            weight = 1.0 / min(self.observed[index] + 1.0, 20.0)
-            turn = float(wrap(world[look.DIRECTION] - row[DIRECTION]))
-            row[DIRECTION] = wrap(row[DIRECTION] + weight * turn)
-            row[OPENING] += weight * (world[look.OPENING] - row[OPENING])
-            first, second = self._sides_by_way(world)
-            row[START], row[END] = max(row[START], first), max(row[END], second)
-            return
-        tx, ty = -math.sin(self.mean[3 + 2 * index]), math.cos(self.mean[3 + 2 * index])
-        first = tx * (world[look.X1] - row[ANCHOR_X]) + ty * (world[look.Y1] - row[ANCHOR_Y])
-        last = tx * (world[look.X2] - row[ANCHOR_X]) + ty * (world[look.Y2] - row[ANCHOR_Y])
-        row[START], row[END] = min(row[START], first), max(row[END], last)
+    def refresh(self, landmarks: Ints, world: Floats) -> None:
+        """Let sightings update what the filter does not estimate: a corner's looks, a wall's extent."""
+        _refresh(self.mean, self.table, self.observed, landmarks, world)
 
     def drop(self, index: int) -> int:
         """Marginalise landmark `index` out of the state; returns its id."""

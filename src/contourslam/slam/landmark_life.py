@@ -57,6 +57,11 @@ class Nursery:
         self._last_seen = np.zeros(0, np.int64)
         self._scan = 0
 
+    @property
+    def empty(self) -> bool:
+        """Whether nothing waits."""
+        return len(self._table) == 0
+
     def ripe(self, world: Floats, config: SlamConfig) -> Ints:
         """Take in the observations without a landmark; returns which of them have now been seen often enough.
 
@@ -125,6 +130,8 @@ def bear(filter_: LandmarkFilter, nursery: Nursery, seen: Observations, world: F
          config: SlamConfig) -> tuple[int, ...]:  # fmt: skip
     """Add the landmarks that were seen often enough and are not there yet; returns their ids."""
     loose = np.flatnonzero(chosen < 0)
+    if loose.size == 0 and nursery.empty:
+        return ()
     # What lies beside a landmark of its kind, outside the gate but close, is most likely that landmark seen badly.
     near = nearest_alike(world[loose], filter_.mean, filter_.table, filter_.count, SAME_PLACE)
     loose = loose[near < 0]
@@ -200,14 +207,13 @@ def _find_twin(
     return -1, -1
 
 
-def merge_twins(filter_: LandmarkFilter, seen_ids: tuple[int, ...], config: SlamConfig) -> tuple[int, ...]:
+def merge_twins(filter_: LandmarkFilter, recent: Ints) -> tuple[int, ...]:
     """Make one of two landmarks that lie in one place; the older id stays. Returns the ids that went.
 
     The two are tied by a measurement of their difference, zero within a centimetre, so that what the younger one knew
-    reaches the map; then the younger is dropped.
+    reaches the map; then the younger is dropped. Only pairs with one of the landmarks just seen, `recent`, are tried.
     """
     gate = chi_square_gate(0.95, 2)
-    recent = np.flatnonzero(np.isin(filter_.ids[: filter_.count], seen_ids))
     i, j = _find_twin(
         filter_.mean, filter_.covariance, filter_.table, filter_.count, recent, gate, SAME_PLACE, SAME_NORMAL
     )

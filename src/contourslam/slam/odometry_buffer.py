@@ -1,9 +1,11 @@
 """The last odometry readings, asked for the motion between scans and during one."""
 
+from bisect import bisect_left, bisect_right
+
 import numpy as np
 
 from contourslam.contour.contours import Floats
-from contourslam.geometry.poses import interpolate
+from contourslam.geometry.poses import interpolate_one
 from contourslam.scan import Odometry
 
 
@@ -38,14 +40,14 @@ class OdometryBuffer:
         poses : ndarray, shape (k, 3)
             ``T_odom_base``.
         """
-        first = max(int(np.searchsorted(self._stamps, start, side="right")) - 1, 0)
+        first = max(bisect_right(self._stamps, start) - 1, 0)
         # One reading before the start stays as well: with two, the motion can be extrapolated.
         first = max(min(first, len(self._stamps) - 2), 0)
         del self._stamps[:first], self._poses[:first]
-        last = int(np.searchsorted(self._stamps, end, side="left")) + 1
+        last = bisect_left(self._stamps, end) + 1
         return np.array(self._stamps[:last]) - start, np.array(self._poses[:last]).reshape(-1, 3)
 
     @staticmethod
     def pose_at_start(times: Floats, poses: Floats) -> Floats:
         """Pose of the odometry at the start asked for, interpolated, never extrapolated."""
-        return np.asarray(interpolate(times, poses, np.zeros(1))[0])
+        return interpolate_one(times, poses, 0.0, True)

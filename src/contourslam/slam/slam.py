@@ -7,7 +7,7 @@ import numpy as np
 from contourslam.config import Config
 from contourslam.contour.contours import Floats, Ints
 from contourslam.detectors import Detector, make_detector
-from contourslam.geometry.poses import between, compose
+from contourslam.geometry.poses import between_one, compose_one
 from contourslam.landmarks import find_landmarks, trace
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam import ekf
@@ -115,8 +115,7 @@ class ContourSlam:
         missed = self._count_sightings(scan, chosen[matched], world[matched])
         matched_ids = tuple(self.filter.ids[chosen[matched]].tolist())
         born = bear(self.filter, self._nursery, seen, world, chosen, self.mount, self.config.slam)
-        dropped = drop_unseen(self.filter, self.config.slam)
-        dropped += merge_twins(self.filter, matched_ids, self.config.slam)
+        dropped = merge_twins(self.filter, chosen[matched]) + drop_unseen(self.filter, self.config.slam)
         self._lap("landmarks")
         pose, covariance = self.filter.pose, self.filter.pose_covariance
         return ScanUpdate(
@@ -149,7 +148,7 @@ class ContourSlam:
         now = self._odometry.pose_at_start(*motion)
         before = now if self._odometry_at_state is None else self._odometry_at_state
         self._odometry_at_state = now
-        increment = between(before, now)
+        increment = between_one(before, now)
         noise = motion_noise(increment, self.config.slam.motion)
         f = self.filter
         start = self._linearised_at if self.config.slam.first_estimates else f.pose
@@ -164,7 +163,7 @@ class ContourSlam:
         """Associate; where little matches, ask whether more would if the wheels had slipped since the last scan."""
         f, config = self.filter, self.config.slam
         chosen = associate(seen, world, f, model, config)
-        matched = np.count_nonzero(chosen >= 0)
+        matched = int(np.count_nonzero(chosen >= 0))
         if config.association != "joint" or matched > 0.5 * len(seen) or len(seen) < SLIP_PAIRS:
             return chosen
         before = f.covariance[:3, :3].copy()
@@ -188,14 +187,13 @@ class ContourSlam:
     def _count_sightings(self, scan: LaserScan, landmarks: Ints, world: Floats) -> tuple[int, ...]:
         """Count o for what was seen and f for what should have been (Fig. 7); returns the ids of the latter."""
         f, config = self.filter, self.config
-        for k, landmark in enumerate(landmarks):
-            f.refresh(int(landmark), world[k])
+        f.refresh(landmarks, world)
         f.observed[landmarks] += 1
         ascending = scan.angles.size < 2 or scan.angles[0] <= scan.angles[-1]
         way = slice(None) if ascending else slice(None, None, -1)
         limit = min(config.lidar.max_range, scan.range_max)
         should = expected_in_scan(
-            f.mean, f.table, f.count, compose(f.mean[:3], self.mount), scan.angles[way], scan.ranges[way], limit,
+            f.mean, f.table, f.count, compose_one(f.mean[:3], self.mount), scan.angles[way], scan.ranges[way], limit,
             config.landmarks.min_side, config.landmarks.min_side_points, config.landmarks.min_wall,
             config.landmarks.min_wall_points,
         )  # fmt: skip
