@@ -43,6 +43,8 @@ class Detect:
 
     def execute(self, command: str) -> int:
         """Detect, draw, and say what was found."""
+        import numpy as np
+
         from contourslam.detectors import make_detector
         from contourslam.landmarks import find_landmarks, trace
         from contourslam.recordings import open_recording
@@ -57,7 +59,8 @@ class Detect:
         detector = make_detector(self.settings.detector, adapted=self.settings.adapted)
         recording = open_recording(self.recording, scan_topic=self.scan_topic)
         scan, motion = _pick(recording, self.scan)
-        detection = find_landmarks(trace(scan, self.settings, motion, recording.lidar_mount), detector, self.settings)
+        mount = None if recording.lidar_mount is None else np.array(recording.lidar_mount)
+        detection = find_landmarks(trace(scan, self.settings, motion, mount), detector, self.settings)
         figure = scan_figure(
             detection,
             self.settings.detector,
