@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 
@@ -19,19 +19,19 @@ Message = LaserScan | Odometry | TruePose
 
 
 class Stopwatch:
-    """Seconds per stage; the clock that the core itself does not read."""
+    """CPU seconds per stage, so that other work on the machine does not count; the core itself reads no clock."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self._last = perf_counter()
+        self._last = thread_time()
 
     def start(self) -> None:
         """Begin to measure the next stage here."""
-        self._last = perf_counter()
+        self._last = thread_time()
 
     def __call__(self, stage: str) -> None:
         """Book the time since the last call under `stage`."""
-        now = perf_counter()
+        now = thread_time()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
         self._last = now
 

@@ -70,7 +70,7 @@ class RunResult:
     corner_map, wall_map
         The final map.
     seconds : dict of str to float
-        Time spent per stage (contour, detection, refinement, association, correction, ...), s.
+        CPU time spent per stage (contour, detection, refinement, association, correction, ...), s.
     skipped : dict of str to int
         Scans and readings that could not be used, by reason.
     complete : bool
