@@ -76,6 +76,8 @@ class Nursery:
         ndarray of int
             Indices into `world`.
         """
+        if config.sightings_to_birth <= 1:
+            return np.arange(len(world))
         self._scan += 1
         known = nearest_alike(world, self._mean, self._table, len(self._table), SAME_PLACE)
         ripe: list[int] = []
@@ -106,8 +108,6 @@ class Nursery:
             self._table = np.concatenate([self._table, rows])
             self._sightings = np.concatenate([self._sightings, np.ones(len(fresh), np.int64)])
             self._last_seen = np.concatenate([self._last_seen, np.full(len(fresh), self._scan)])
-        if config.sightings_to_birth == 1:
-            return np.flatnonzero(known < 0)
         return np.array(ripe, dtype=np.int64)
 
 
