@@ -1,4 +1,4 @@
-"""Measured tables: printed, kept as JSON, and put into BENCHMARK.md between their markers."""
+"""Measured tables: printed, kept as JSON, and put between their markers into the documents that have them."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BENCHMARK = ROOT / "BENCHMARK.md"
+DOCUMENTS = (ROOT / "BENCHMARK.md", ROOT / "README.md")
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Table:
     Attributes
     ----------
     name : str
-        Marker of the table in BENCHMARK.md.
+        Marker of the table in the documents.
     columns : sequence of str
     rows : sequence of sequences
         Cells; a float is printed with three significant digits.
@@ -51,7 +51,7 @@ def machine() -> str:
 
 
 def publish(table: Table) -> None:
-    """Print the table, keep it as JSON, and with ``--write`` put it into BENCHMARK.md."""
+    """Print the table, keep it as JSON, and with ``--write`` put it into the documents."""
     print(table.markdown())
     kept = ROOT / "out" / "benchmarks" / f"{table.name}.json"
     kept.parent.mkdir(parents=True, exist_ok=True)
@@ -59,9 +59,10 @@ def publish(table: Table) -> None:
     kept.write_text(json.dumps({"machine": machine(), "rows": rows}, indent=2) + "\n")
     if "--write" in sys.argv[1:]:
         begin, end = f"<!-- {table.name} -->", f"<!-- /{table.name} -->"
-        text = BENCHMARK.read_text()
-        pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
-        if not pattern.search(text):
-            raise SystemExit(f"{BENCHMARK.name} has no place for the table {table.name!r}: add {begin} and {end}")
         block = f"{begin}\nOn {machine()}:\n\n{table.markdown()}\n{end}"
-        BENCHMARK.write_text(pattern.sub(lambda match: block, text))
+        pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
+        places = [document for document in DOCUMENTS if pattern.search(document.read_text())]
+        if not places:
+            raise SystemExit(f"no document has a place for the table {table.name!r}: add {begin} and {end}")
+        for document in places:
+            document.write_text(pattern.sub(lambda match: block, document.read_text()))

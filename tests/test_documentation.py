@@ -1,0 +1,56 @@
+"""What the documents name is there."""
+
+import importlib
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+
+
+def resolves(name: str) -> bool:
+    """Whether a dotted name below the package is a module or something in one."""
+    parts = name.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found = importlib.import_module(".".join(["contourslam", *parts[:cut]]))
+        except ModuleNotFoundError:
+            continue
+        return cut == len(parts) or (cut == len(parts) - 1 and hasattr(found, parts[cut]))
+    return False
+
+
+def test_every_function_that_the_equations_lead_to_exists() -> None:
+    text = (ROOT / "docs" / "paper.md").read_text()
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    names = [name for line in rows for name in re.findall(r"`([a-z_]+\.[A-Za-z_.]+)`", line)]
+    assert len(names) > 30
+    assert [name for name in names if not resolves(name)] == []
+
+
+def test_every_full_name_in_a_document_exists() -> None:
+    names = {
+        name
+        for document in DOCUMENTS
+        for name in re.findall(r"`contourslam\.([a-z_]+(?:\.[A-Za-z_]+)*)`", document.read_text())
+    }
+    assert names
+    assert [name for name in sorted(names) if not resolves(name)] == []
+
+
+def test_every_link_between_documents_leads_somewhere() -> None:
+    links = [
+        (document.name, target)
+        for document in DOCUMENTS
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", document.read_text())
+    ]
+    assert links
+    assert [link for link in links if not (ROOT / link[1]).exists() and not (ROOT / "docs" / link[1]).exists()] == []
+
+
+def test_every_benchmark_has_its_place_in_the_tables() -> None:
+    text = (ROOT / "BENCHMARK.md").read_text()
+    for script in (ROOT / "benchmarks").glob("bench_*.py"):
+        name = script.stem.removeprefix("bench_")
+        assert f"<!-- {name} -->" in text
+        assert f"<!-- /{name} -->" in text
