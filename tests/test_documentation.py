@@ -2,7 +2,13 @@
 
 import importlib
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
+
+from contourslam.cli import main
+from contourslam.cli.entry import COMMANDS, parse
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -54,3 +60,22 @@ def test_every_benchmark_has_its_place_in_the_tables() -> None:
         name = script.stem.removeprefix("bench_")
         assert f"<!-- {name} -->" in text
         assert f"<!-- /{name} -->" in text
+
+
+def test_every_command_in_a_document_parses() -> None:
+    lines = [line.strip() for document in DOCUMENTS for line in document.read_text().splitlines()]
+    commands = [line for line in lines if line.startswith("contourslam ")]
+    assert {line.split()[1] for line in commands} >= COMMANDS.keys() - {"compare"}
+    for line in commands:
+        words = shlex.split(line, comments=True)[1:]
+        assert type(parse(words)).__name__.lower() == words[0]
+
+
+def test_the_python_code_of_readme_runs(tmp_path: Path) -> None:
+    recording = tmp_path / "recording"
+    assert main(["simulate", "-o", str(recording), "--duration", "2"]) == 0
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert "my_log.bag" in code
+    command = [sys.executable, "-W", "error", "-c", code.replace("my_log.bag", str(recording))]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) >= 20
