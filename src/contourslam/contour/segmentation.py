@@ -16,7 +16,9 @@ def _break_distance(reach: float, step: float, shallowest: float, allowance: flo
     """Farthest that a next point on the same surface can lie (Borges and Aldon 2004, eq. 5)."""
     if step >= shallowest:
         return max_gap
-    return min(reach * math.sin(step) / math.sin(shallowest - step) + allowance, max_gap)
+    # sin(step) / sin(shallowest - step), with one trigonometric function left inside the loop over the beams
+    slope = math.tan(step)
+    return min(reach * slope / (math.sin(shallowest) - math.cos(shallowest) * slope) + allowance, max_gap)
 
 
 @kernel
@@ -57,9 +59,10 @@ def _segment(
         missing = (beams[b] - beams[a]) % beam_count - 1
         step = abs(bearings[b] - bearings[a])
         step = min(step, 2.0 * math.pi - step)
-        limit = _break_distance(min(ranges[a], ranges[b]), step, shallowest, allowance, max_gap)
         gap = math.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])
-        cut[i] = missing > max_missing or gap > limit
+        cut[i] = missing > max_missing or gap > min(allowance, max_gap)
+        if missing <= max_missing and cut[i]:  # most points lie closer than the noise alone allows
+            cut[i] = gap > _break_distance(min(ranges[a], ranges[b]), step, shallowest, allowance, max_gap)
     first = 0
     while first < n and not cut[first]:
         first += 1
@@ -92,7 +95,7 @@ def _segment(
 
 def _in_order(points: Floats, bearings: Floats, beams: Ints) -> tuple[Floats, Floats, Ints]:
     """Sort the beams by direction where the lidar did not deliver them so: shuffled, or angles that wrap."""
-    steps = np.diff(bearings)
+    steps = bearings[1:] - bearings[:-1]
     if (steps >= 0.0).all() or (steps <= 0.0).all():
         return points, bearings, beams
     unwrapped = np.unwrap(bearings)

@@ -85,9 +85,10 @@ def grow_line(
         if count >= 3 and length > least:
             vx, vy = mx / count, my / count
             sxx, sxy, syy = mxx - count * vx * vx, mxy - count * vx * vy, myy - count * vy * vy
-            direction = 0.5 * math.atan2(2.0 * sxy, sxx - syy)
-            nx, ny = math.sin(direction), -math.cos(direction)
-            if abs(nx * (x - vx) + ny * (y - vy)) > 3.0 * sigma:
+            # Direction of the largest spread: eigenvector of the scatter matrix, by square roots alone.
+            spread = math.sqrt((sxx - syy) * (sxx - syy) + 4.0 * sxy * sxy)
+            tx, ty = (spread + sxx - syy, 2.0 * sxy) if sxx >= syy else (2.0 * sxy, spread + syy - sxx)
+            if abs(ty * (x - vx) - tx * (y - vy)) > math.sqrt(tx * tx + ty * ty) * 3.0 * sigma:
                 strays += 1
                 if strays > 1:
                     break

@@ -128,10 +128,12 @@ def correct(
                 for i in range(size):
                     w[a, i] += h * gathered[k, i]
     s = noise.copy()
-    for a in range(z):
-        for b in range(z):
-            for k in range(c):
-                s[a, b] += w[a, columns[k]] * jacobian[b, k]
+    for b in range(z):
+        for k in range(c):
+            h = jacobian[b, k]
+            if h != 0.0:
+                for a in range(b, z):  # the factorisation reads the lower triangle only
+                    s[a, b] += w[a, columns[k]] * h
     lower = cholesky(s)
     if lower[z - 1, z - 1] <= 0.0:
         return -1.0

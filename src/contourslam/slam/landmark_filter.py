@@ -56,6 +56,13 @@ def _refresh(mean: Floats, table: Floats, observed: Ints, landmarks: Ints, world
             row[START], row[END] = min(row[START], first), max(row[END], last)
 
 
+@kernel
+def _wrap_walls(mean: Floats, table: Floats, landmarks: Ints) -> None:
+    for i in landmarks:
+        if table[i, KIND] == WALL:
+            mean[3 + 2 * i] = wrap_angle(mean[3 + 2 * i])
+
+
 class LandmarkFilter:
     """Pose, landmarks and covariance; it is changed in place by every step.
 
@@ -170,9 +177,7 @@ class LandmarkFilter:
 
     def wrap_walls(self, landmarks: Ints) -> None:
         """Wrap the directions of these landmarks that are walls, after a correction."""
-        for i in landmarks:
-            if self.table[i, KIND] == WALL:
-                self.mean[3 + 2 * i] = wrap(self.mean[3 + 2 * i])
+        _wrap_walls(self.mean, self.table, landmarks)
 
     def constrain(self, first: int, second: int, jacobian: Floats, nu: Floats, noise: Floats) -> float:
         """Correct with a relation between two landmarks (`jacobian` of shape (2, 4)); returns the NIS."""

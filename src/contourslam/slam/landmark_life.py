@@ -11,7 +11,7 @@ from contourslam.kernels import kernel
 from contourslam.slam import observation as look
 from contourslam.slam.ekf import covariance_block, landmark_columns
 from contourslam.slam.gates import chi_square_gate
-from contourslam.slam.gating import looks_alike, offset_from
+from contourslam.slam.gating import angle_between, looks_alike, offset_from
 from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.measurement import (
     ANCHOR_X,
@@ -129,7 +129,7 @@ def _as_landmark(world: Floats) -> tuple[Floats, Floats]:
 def bear(filter_: LandmarkFilter, nursery: Nursery, seen: Observations, world: Floats, chosen: Ints, mount: Floats,
          config: SlamConfig) -> tuple[int, ...]:  # fmt: skip
     """Add the landmarks that were seen often enough and are not there yet; returns their ids."""
-    loose = np.flatnonzero(chosen < 0)
+    loose = (chosen < 0).nonzero()[0]
     if loose.size == 0 and nursery.empty:
         return ()
     # What lies beside a landmark of its kind, outside the gate but close, is most likely that landmark seen badly.
@@ -143,7 +143,7 @@ def drop_unseen(filter_: LandmarkFilter, config: SlamConfig) -> tuple[int, ...]:
     count = filter_.count
     chances = filter_.observed[:count] + filter_.failed[:count]
     rate = filter_.failed[:count] / np.maximum(chances, 1)
-    doomed = np.flatnonzero((chances >= config.min_chances) & (rate > config.max_false_negative_rate))
+    doomed = ((chances >= config.min_chances) & (rate > config.max_false_negative_rate)).nonzero()[0]
     return tuple(filter_.drop(int(i)) for i in doomed[::-1])
 
 
@@ -166,31 +166,37 @@ def _difference(mean: Floats, table: Floats, i: int, j: int) -> tuple[float, flo
 
 
 @kernel
+def _near_and_alike(mean: Floats, table: Floats, i: int, j: int, within: float, turn: float) -> bool:
+    """Cheap test before the exact one: same kind, same looks, in one place."""
+    if j == i or table[i, KIND] != table[j, KIND]:
+        return False
+    a, b = mean[3 + 2 * i], mean[4 + 2 * i]
+    c, d = mean[3 + 2 * j], mean[4 + 2 * j]
+    if table[i, KIND] == CORNER:
+        if abs(a - c) > within or abs(b - d) > within or table[i, CONVEX] != table[j, CONVEX]:
+            return False
+        same_way = angle_between(table[i, DIRECTION], table[j, DIRECTION]) < 3.0 * turn
+        return bool(same_way and math.hypot(a - c, b - d) < within)
+    if angle_between(a, c) >= turn:
+        return False
+    dx, dy = table[j, ANCHOR_X] - table[i, ANCHOR_X], table[j, ANCHOR_Y] - table[i, ANCHOR_Y]
+    if abs(b - d - math.cos(c) * dx - math.sin(c) * dy) > within:
+        return False
+    shift = -math.sin(a) * dx + math.cos(a) * dy
+    return bool(max(table[j, START] + shift - table[i, END], table[i, START] - table[j, END] - shift) < 0.0)
+
+
+@kernel
 def _find_twin(
     mean: Floats, covariance: Floats, table: Floats, count: int, recent: Ints, gate: float, within: float, turn: float
 ) -> tuple[int, int]:
     """First pair of landmarks, one of them just seen, that the filter itself cannot tell apart; (-1, -1) for none."""
     for i in recent:
         for j in range(count):
-            if j == i or table[i, KIND] != table[j, KIND]:
+            if not _near_and_alike(mean, table, i, j, within, turn):
                 continue
             first, second, jacobian = _difference(mean, table, i, j)
-            if table[i, KIND] == CORNER:
-                apart = math.hypot(first, second)
-                alike = table[i, CONVEX] == table[j, CONVEX] and (
-                    abs((table[i, DIRECTION] - table[j, DIRECTION] + math.pi) % (2.0 * math.pi) - math.pi) < 3.0 * turn
-                )
-            else:
-                apart = abs(second)
-                alike = abs(first) < turn
-                tx, ty = -math.sin(mean[3 + 2 * i]), math.cos(mean[3 + 2 * i])
-                shift = tx * (table[j, ANCHOR_X] - table[i, ANCHOR_X]) + ty * (table[j, ANCHOR_Y] - table[i, ANCHOR_Y])
-                gap = max(table[j, START] + shift - table[i, END], table[i, START] - table[j, END] - shift)
-                alike = alike and gap < 0.0
-            if not alike or apart > within:
-                continue
-            columns = landmark_columns(np.array([i, j]))[3:]
-            p = covariance_block(covariance, columns)
+            p = covariance_block(covariance, landmark_columns(np.array([i, j]))[3:])
             s = np.zeros((2, 2))
             for a in range(2):
                 for b in range(2):

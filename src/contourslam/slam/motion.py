@@ -31,7 +31,9 @@ def motion_noise(increment: Floats, config: MotionConfig) -> Floats:
     lateral = config.lateral_per_sqrt_m**2 * (distance + 0.1 * turn) + 1e-10
     heading = math.radians(config.turn_per_sqrt_m_deg) ** 2 * distance
     heading += math.radians(config.turn_per_sqrt_rad_deg) ** 2 * turn + 1e-10
-    return np.diag([forward, lateral, heading])
+    noise = np.zeros((3, 3))
+    noise[0, 0], noise[1, 1], noise[2, 2] = forward, lateral, heading
+    return noise
 
 
 @kernel

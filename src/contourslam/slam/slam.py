@@ -109,7 +109,7 @@ class ContourSlam:
         self._lap("prediction")
         chosen = self._associate(seen, world, model)
         self._lap("association")
-        matched = np.flatnonzero(chosen >= 0)
+        matched = (chosen >= 0).nonzero()[0]
         nis = self._correct(matched, chosen[matched], seen.values, seen.noises, model)
         self._lap("correction")
         missed = self._count_sightings(scan, chosen[matched], world[matched])
@@ -163,7 +163,7 @@ class ContourSlam:
         """Associate; where little matches, ask whether more would if the wheels had slipped since the last scan."""
         f, config = self.filter, self.config.slam
         chosen = associate(seen, world, f, model, config)
-        matched = int(np.count_nonzero(chosen >= 0))
+        matched = int((chosen >= 0).sum())
         if config.association != "joint" or matched > 0.5 * len(seen) or len(seen) < SLIP_PAIRS:
             return chosen
         before = f.covariance[:3, :3].copy()

@@ -22,6 +22,7 @@ from contourslam.slam.measurement import (
 GRAZING = math.sin(math.radians(15.0))  # surfaces seen flatter than this are not expected to be found
 CLEARANCE = 0.15  # a beam that ends this much (m) before a landmark was stopped by something else
 WALL_SAMPLES = 9
+SEAM = 3.0  # a scan whose ends leave no more than this many beams' steps between them is a full turn
 MARGIN = 1.5  # how much more than the least size of a landmark must be in sight before it is expected
 
 
@@ -31,9 +32,8 @@ def _beam_reaches(distance: float, bearing: float, angles: Floats, ranges: Float
     n = angles.size
     turn = 2.0 * math.pi
     direction = angles[0] + (bearing - angles[0]) % turn
-    i = int(np.searchsorted(angles, direction))
-    step = (angles[n - 1] - angles[0]) / max(n - 1, 1)
-    if direction > angles[n - 1] + step and direction - turn < angles[0] - step:
+    i = max(int(np.searchsorted(angles, direction)), 1)
+    if i == n and turn - (angles[n - 1] - angles[0]) > SEAM * (angles[n - 1] - angles[0]) / max(n - 1, 1):
         return 0  # outside the field of view
     for k in (i - 1, i):
         r = ranges[k % n]
@@ -63,6 +63,21 @@ def _corner_in_sight(
         if facing < GRAZING or length < min_side:
             return False
         if length * facing / (r * beam_step) < MARGIN * min_points:
+            return False
+    return True
+
+
+@kernel
+def _sides_in_sight(
+    x: float, y: float, table: Floats, lidar: Floats, angles: Floats, ranges: Floats, max_range: float, min_side: float
+) -> bool:
+    """Whether enough of both sides of the corner lies in the field of view and is not hidden."""
+    for way in (-1.0, 1.0):
+        side = table[DIRECTION] + way * 0.5 * table[OPENING]
+        length = min(table[START] if way < 0.0 else table[END], MARGIN * min_side)
+        dx, dy = x + length * math.cos(side) - lidar[0], y + length * math.sin(side) - lidar[1]
+        bearing = math.atan2(dy, dx) - lidar[2]
+        if _beam_reaches(math.hypot(dx, dy), bearing, angles, ranges, max_range) != 1:
             return False
     return True
 
@@ -103,7 +118,9 @@ def expected_in_scan(
             r = math.hypot(dx, dy)
             if r < max_range and _corner_in_sight(a, b, table[j], lidar, beam_step, min_side, min_side_points):
                 bearing = math.atan2(dy, dx) - lidar[2]
-                expected[j] = _beam_reaches(r, bearing, angles, ranges, max_range) == 1
+                expected[j] = _beam_reaches(r, bearing, angles, ranges, max_range) == 1 and _sides_in_sight(
+                    a, b, table[j], lidar, angles, ranges, max_range, min_side
+                )
             continue
         nx, ny = math.cos(a), math.sin(a)
         distance = b - nx * (lidar[0] - table[j, ANCHOR_X]) - ny * (lidar[1] - table[j, ANCHOR_Y])
