@@ -1,7 +1,7 @@
 """The one place where Numba is set up, so that every kernel is compiled with the same options."""
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numba
 
@@ -13,5 +13,4 @@ def kernel(function: F) -> F:
 
     No fast-math: scans carry NaN and inf on purpose, and the compiler must not assume them away.
     """
-    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))

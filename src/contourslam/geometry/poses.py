@@ -79,8 +79,8 @@ def interpolate_one(stamps: Floats, poses: Floats, wanted: float, clamped: bool)
     """:func:`interpolate` for one time: a kernel; not `clamped`, it goes on at the twist of the nearest readings."""
     n = stamps.size
     if n == 1:
-        return poses[0].copy()
-    i = min(max(np.searchsorted(stamps, wanted, side="right") - 1, 0), n - 2)
+        return compose_one(np.zeros(3), poses[0])
+    i = min(max(int(np.searchsorted(stamps, wanted, side="right")) - 1, 0), n - 2)
     weight = (wanted - stamps[i]) / max(stamps[i + 1] - stamps[i], 1e-12)
     if clamped:
         weight = min(max(weight, 0.0), 1.0)
