@@ -81,7 +81,8 @@ def interpolate_one(stamps: Floats, poses: Floats, wanted: float, clamped: bool)
     if n == 1:
         return compose_one(np.zeros(3), poses[0])
     i = min(max(int(np.searchsorted(stamps, wanted, side="right")) - 1, 0), n - 2)
-    weight = (wanted - stamps[i]) / max(stamps[i + 1] - stamps[i], 1e-12)
+    span = stamps[i + 1] - stamps[i]
+    weight = (wanted - stamps[i]) / span if span > 0.0 else 0.0
     if clamped:
         weight = min(max(weight, 0.0), 1.0)
     return compose_one(poses[i], between_one(poses[i], poses[i + 1]) * weight)
