@@ -127,16 +127,17 @@ def expected_in_scan(
         if distance <= 0.0 or distance > max_range:  # behind the lidar's back: the wall's other face
             continue
         length = table[j, END] - table[j, START]
-        seen = beams = 0.0
+        seen = beams = 0.0  # of the piece in sight that the samples have come to
         for k in range(WALL_SAMPLES):
             along = table[j, START] + (k + 0.5) / WALL_SAMPLES * length
             dx = table[j, ANCHOR_X] + b * nx - along * ny - lidar[0]
             dy = table[j, ANCHOR_Y] + b * ny + along * nx - lidar[1]
             r = math.hypot(dx, dy)
-            if r > max_range or distance < GRAZING * r:
-                continue
-            if _beam_reaches(r, math.atan2(dy, dx) - lidar[2], angles, ranges, max_range) == 1:
+            in_sight = r <= max_range and distance >= GRAZING * r
+            if in_sight and _beam_reaches(r, math.atan2(dy, dx) - lidar[2], angles, ranges, max_range) == 1:
                 seen += length / WALL_SAMPLES
                 beams += length / WALL_SAMPLES * distance / (r * r * beam_step)
-        expected[j] = seen > MARGIN * min_wall and beams > MARGIN * min_wall_points
+                expected[j] = expected[j] or (seen > MARGIN * min_wall and beams > MARGIN * min_wall_points)
+            else:
+                seen = beams = 0.0
     return expected
