@@ -19,9 +19,11 @@ def _lidar_motion(times: Floats, base_poses: Floats, T_base_lidar: Floats) -> Fl
     motion = np.zeros((times.size, 3))
     if times.size < 2:
         return motion
-    start = compose_one(interpolate_one(times, base_poses, 0.0, False), T_base_lidar)
     for k in range(times.size):
-        motion[k] = between_one(start, compose_one(base_poses[k], T_base_lidar))
+        motion[k] = compose_one(base_poses[k], T_base_lidar)
+    start = interpolate_one(times, motion, 0.0, False)
+    for k in range(times.size):
+        motion[k] = between_one(start, motion[k])
     return motion
 
 
