@@ -10,6 +10,7 @@ from contourslam.config import LandmarkConfig
 from contourslam.contour.contours import Contours, Floats, Ints
 from contourslam.kernels import kernel
 from contourslam.landmarks.line_fit import fit_line, grow_line
+from contourslam.landmarks.roundness import is_round
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +92,12 @@ def _refine(
             )
             if not found:
                 break
-            n1x, n1y, c1x, c1y, o1, a1, s1 = fit_line(points, end1, first, a, n, sigma)
-            n2x, n2y, c2x, c2y, o2, a2, s2 = fit_line(points, second, end2, a, n, sigma)
+            line1 = fit_line(points, end1, first, a, n, sigma)
+            line2 = fit_line(points, second, end2, a, n, sigma)
+            n1x, n1y, c1x, c1y, o1, a1, s1 = line1
+            n2x, n2y, c2x, c2y, o2, a2, s2 = line2
             x, y, sine = intersect(n1x, n1y, c1x, c1y, n2x, n2y, c2x, c2y)
-            found = sine != 0.0 and s1 < 3.0 and s2 < 3.0
+            found = sine != 0.0
             if not found:
                 break
             var1 = o1 + a1 * ((x - c1x) ** 2 + (y - c1y) ** 2)
@@ -114,7 +117,13 @@ def _refine(
                 # A true corner lies on its contour: at most a beam's step from the nearest point.
                 i, j = a + (nearest - 1 - a) % n, a + (nearest + 1 - a) % n
                 step = 0.5 * math.hypot(points[j, 0] - points[i, 0], points[j, 1] - points[i, 1])
-                found = math.sqrt(best) <= step + 4.0 * sigma
+                # Only now are the sides free of points from round the corner, so that they must be straight.
+                found = (
+                    s1 < 3.0
+                    and s2 < 3.0
+                    and math.sqrt(best) <= step + 4.0 * sigma
+                    and not is_round(points, end1, vertex, end2, a, n, line1, line2)
+                )
                 break
             vertex = nearest
         if not found or side1 < min_side or side2 < min_side:
@@ -158,9 +167,9 @@ def _refine(
 def refine_corners(contours: Contours, candidates: Floats, sigma_range: float, config: LandmarkConfig) -> Corners:
     """Refine candidates to corners: fit a line to each side on the raw contour and intersect the two.
 
-    Candidates are dropped whose sides are too short, not straight, nearly in one line, or whose lines meet away from
-    the contour, as on a round column. The covariance follows from the two fits: ``A p = rho`` with the normals in ``A``
-    gives ``A^-1 diag(q) A^-T``, where q_i is the variance of line i at the corner.
+    Candidates are dropped whose sides are too short, not straight, nearly in one line, or round as on a column, and
+    those whose lines meet away from the contour. The covariance follows from the two fits: ``A p = rho`` with the
+    normals in ``A`` gives ``A^-1 diag(q) A^-T``, where q_i is the variance of line i at the corner.
 
     Parameters
     ----------
