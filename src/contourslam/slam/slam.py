@@ -189,11 +189,13 @@ class ContourSlam:
         f, config = self.filter, self.config
         f.refresh(landmarks, world)
         f.observed[landmarks] += 1
-        ascending = scan.angles.size < 2 or scan.angles[0] <= scan.angles[-1]
-        way = slice(None) if ascending else slice(None, None, -1)
+        angles, ranges = scan.angles, scan.ranges
+        if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
+            way = np.argsort(angles, kind="stable")
+            angles, ranges = angles[way], ranges[way]
         limit = min(config.lidar.max_range, scan.range_max)
         should = expected_in_scan(
-            f.mean, f.table, f.count, compose_one(f.mean[:3], self.mount), scan.angles[way], scan.ranges[way], limit,
+            f.mean, f.table, f.count, compose_one(f.mean[:3], self.mount), angles, ranges, limit,
             config.landmarks.min_side, config.landmarks.min_side_points, config.landmarks.min_wall,
             config.landmarks.min_wall_points,
         )  # fmt: skip
