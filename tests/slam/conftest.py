@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+from contourslam.geometry.poses import compose
 from contourslam.landmarks import Corners, Walls
+from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.observation import Observations, observe
 
@@ -110,3 +112,57 @@ def random_covariance() -> Callable[..., Floats]:
 @pytest.fixture(scope="session")
 def full() -> Callable[[LandmarkFilter], Floats]:
     return _full
+
+
+ROOM = [[-3.0, -2.5], [4.0, -2.5], [4.0, 3.0], [1.5, 3.0], [1.5, 2.0], [-3.0, 2.0]]
+BOX = [[1.2, -0.4], [1.2, 0.6], [2.4, 0.6], [2.4, -0.4]]
+MOUNT = np.array([0.1, 0.0, 0.0])
+PERIOD = 0.1
+
+
+def _drive(
+    scans: int = 80,
+    *,
+    beams: int | Sequence[int] = 360,
+    box: Callable[[int], bool] = lambda i: True,
+    seed: int = 0,
+    sigma: float = 0.005,
+    standing_from: int = 10_000,
+) -> list[LaserScan | Odometry | TruePose]:
+    """A drive round a circle of 0.8 m in a room with an alcove and a box; odometry drifts by some per cent."""
+    rng = np.random.default_rng(seed)
+    outline = [np.stack([np.array(p), np.roll(p, -1, axis=0)], axis=1) for p in (ROOM, BOX)]
+    counts = [beams] if isinstance(beams, int) else list(beams)
+    messages: list[LaserScan | Odometry | TruePose] = []
+    for i in range(scans):
+        stamp = 50.0 + PERIOD * i
+        turn = 0.06 * min(i, standing_from)
+        true = np.array([0.8 * math.sin(turn), -0.8 * math.cos(turn), math.remainder(turn, 2.0 * math.pi)])
+        wheels = np.array([0.83 * math.sin(1.02 * turn), 0.83 * (1.0 - math.cos(1.02 * turn)), 1.02 * turn])
+        messages += [Odometry(stamp, np.array([7.0, -3.0, 0.0]) + wheels), TruePose(stamp, true)]
+        n = counts[i % len(counts)]
+        angles = -math.pi + 2.0 * math.pi / n * np.arange(n)
+        lidar = compose(true, MOUNT)
+        segments = np.concatenate(outline if box(i) else outline[:1])
+        ranges = _cast(segments, lidar[:2], angles + lidar[2]) + sigma * rng.standard_normal(n)
+        messages.append(LaserScan(stamp, angles, ranges, np.zeros(n), 0.05, 30.0))
+    return messages
+
+
+def _cast(segments: Floats, origin: Floats, directions: Floats) -> Floats:
+    dx, dy = np.cos(directions)[:, None], np.sin(directions)[:, None]
+    (ax, ay), (ex, ey) = (segments[:, 0] - origin).T, (segments[:, 1] - segments[:, 0]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (ax * ey - ay * ex) / (dx * ey - dy * ex)
+        share = (ax * dy - ay * dx) / (dx * ey - dy * ex)
+    return np.where((share >= 0.0) & (share <= 1.0) & (along > 0.0), along, np.inf).min(axis=1)
+
+
+@pytest.fixture(scope="session")
+def drive() -> Callable[..., list[LaserScan | Odometry | TruePose]]:
+    return _drive
+
+
+@pytest.fixture(scope="session")
+def mount() -> Floats:
+    return MOUNT
