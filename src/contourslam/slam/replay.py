@@ -16,6 +16,7 @@ from contourslam.slam.result import RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
 Message = LaserScan | Odometry | TruePose
+BLIND = "scans before the first odometry"
 
 
 class Stopwatch:
@@ -72,12 +73,11 @@ def replay(
     Raises
     ------
     RecordingError
-        If the recording fails before its first scan.
+        If the recording fails before its first scan, or holds none.
     """
     watch = Stopwatch()
     slam: ContourSlam | None = None
-    updates: list[ScanUpdate] = []
-    odometry: list[Floats] = []
+    done: list[tuple[ScanUpdate, Floats]] = []  # one list, so that Ctrl-C cannot come between two
     truth: list[TruePose] = []
     skipped: Counter[str] = Counter()
     mount = None if lidar_mount is None else np.asarray(lidar_mount, dtype=np.float64)
@@ -102,18 +102,17 @@ def replay(
                 slam.push_odometry(reading)
             waiting.clear()
             if newest is None:
-                skipped["scans before the first odometry"] += 1
+                skipped[BLIND] += 1
             watch.start()
             update = slam.push_scan(message)
-            updates.append(update)
-            odometry.append(slam.odometry_pose)
+            done.append((update, slam.odometry_pose))
             if on_scan is not None:
                 on_scan(message, update)
     except KeyboardInterrupt:
         complete = False
         skipped["interrupted"] += 1
     except RecordingError as error:
-        if not updates:
+        if not done:
             raise
         complete = False
         skipped[str(error)] += 1
@@ -121,7 +120,7 @@ def replay(
         if complete:
             raise RecordingError("the recording holds no scan")
         slam = ContourSlam(config, detector, initial_pose=initial_pose, lidar_mount=mount)
-    return _result(config, slam, updates, odometry, truth, watch, dict(skipped), complete)
+    return _result(config, slam, done, truth, watch, dict(skipped), complete)
 
 
 def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
@@ -132,17 +131,19 @@ def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
 def _result(
     config: Config,
     slam: ContourSlam,
-    updates: list[ScanUpdate],
-    odometry: list[Floats],
+    done: list[tuple[ScanUpdate, Floats]],
     truth: list[TruePose],
     watch: Stopwatch,
     skipped: dict[str, int],
     complete: bool,
 ) -> RunResult:
+    updates = [update for update, _ in done]
     stamps = np.array([u.stamp for u in updates])
     poses = np.array([u.pose for u in updates]).reshape(-1, 3)
-    raw = np.array(odometry).reshape(-1, 3)
+    raw = np.array([odometry for _, odometry in done]).reshape(-1, 3)
     if len(raw):
+        blind = min(skipped.get(BLIND, 0), len(raw) - 1)
+        raw[:blind] = raw[blind]  # the wheels' own origin is no motion
         raw = compose(slam.start_pose, between(raw[0], raw))
     counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64).reshape(-1, 4)
     return RunResult(
