@@ -53,7 +53,7 @@ class ContourConfig:
     min_points: int = 4
     """A contour of fewer points is dropped, mixed pixels among them."""
     average_sigmas: float = 3.0
-    """Points closer than this many standard deviations of the range are averaged first, before equalizing; 0 for none."""
+    """Points closer than this many standard deviations of the range are averaged before equalizing; 0 for none."""
     spacing: float = 0.05
     """Least length of the equalized contour's elementary vectors, m."""
     spacing_sigmas: float = 6.0

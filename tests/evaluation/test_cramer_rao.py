@@ -84,7 +84,7 @@ def test_a_straight_corridor_leaves_the_way_along_it_open():
     assert np.isinf(bound.filtered_sd).all()
     known = cramer_rao_bound(walls, np.empty((0, 3)), poses, ScanModel(ANGLES), initial_covariance=np.zeros((3, 3)))
     x, y, theta = known.filtered_sd[1]
-    assert x == pytest.approx(0.02 * np.sqrt(0.5), rel=0.01)  # the wheels' alone
+    assert x == pytest.approx(MotionConfig().forward_per_sqrt_m * np.sqrt(0.5), rel=0.01)  # the wheels' alone
     assert y < 0.002
     assert theta < np.radians(0.2)
 

@@ -4,6 +4,8 @@ The paper's own rule is the nearest neighbour within a fixed distance. Beside it
 Mahalanobis, the mutual nearest with a test against the runner-up, and joint compatibility (Neira and Tardos 2001).
 """
 
+import math
+
 import numpy as np
 
 from contourslam.config import SlamConfig
@@ -82,6 +84,16 @@ def assign_nearest(k: int, count: int, seen: Ints, landmark: Ints, distance: Flo
     return chosen
 
 
+@kernel
+def log_unknown(world: Floats, values: Floats) -> Floats:
+    """Logarithm of how many unknown landmarks there are per unit of each observation's measurement, shape (k,)."""
+    out = np.empty(world.shape[0])
+    for i in range(world.shape[0]):
+        corner = world[i, look.KIND] == CORNER
+        out[i] = math.log(UNKNOWN_CORNERS * max(values[i, 0], 0.1) if corner else UNKNOWN_WALLS)
+    return out
+
+
 def associate(seen: Observations, world: Floats, f: LandmarkFilter, model: Model, config: SlamConfig) -> Ints:
     """Landmark of each observation, -1 where it has none.
 
@@ -109,11 +121,9 @@ def associate(seen: Observations, world: Floats, f: LandmarkFilter, model: Model
     )
     if config.association == "joint":
         gates = joint_gates(config.gate_probability, len(seen))
-        corner = world[:, look.KIND] == CORNER
-        per_unit = np.where(corner, UNKNOWN_CORNERS * np.maximum(seen.values[:, 0], 0.1), UNKNOWN_WALLS)
+        news = log_unknown(world, seen.values)
         return joint_compatibility(
-            len(seen), seen.noises, f.covariance, model[1], model[2], rows, landmarks, innovations, gates,
-            np.log(per_unit), corner,
-        )  # fmt: skip
+            news, seen.noises, f.covariance, f.table, model[1], model[2], rows, landmarks, innovations, gates
+        )
     lead = AMBIGUITY_LEAD if config.association == "mutual" else 0.0
     return assign_nearest(len(seen), f.count, rows, landmarks, distance, lead)

@@ -103,6 +103,9 @@ def compatible_pairs(
             a, b = mean[3 + 2 * j], mean[4 + 2 * j]
             if world[i, look.KIND] != table[j, KIND]:
                 continue
+            direction = table[j, DIRECTION] if table[j, KIND] == CORNER else a
+            if angle_between(world[i, look.DIRECTION], direction) > MAX_DIRECTION_DIFFERENCE:
+                continue  # most end here, before the dearer tests
             apart = offset_from(world[i], table[j], a, b)
             if apart > REACH or not looks_alike(world[i], table[j], a):
                 continue

@@ -3,11 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
 from contourslam.slam.ekf import covariance_block, landmark_columns
+from contourslam.slam.measurement import CORNER, KIND
 
 # A single pair has no other to agree with: its direction must be known this well (rad) beforehand.
 ALONE = 0.12
@@ -77,8 +77,8 @@ def _extend(lower: Floats, y: Floats, s: Floats, nu: Floats, order: Ints, depth:
 
 @kernel
 def joint_compatibility(
-    k: int, noises: Floats, covariance: Floats, by_pose: Floats, by_landmark: Floats, seen: Ints, landmark: Ints,
-    innovations: Floats, gates: Floats, log_densities: Floats, corner: NDArray[np.bool_],
+    news: Floats, noises: Floats, covariance: Floats, table: Floats, by_pose: Floats, by_landmark: Floats, seen: Ints,
+    landmark: Ints, innovations: Floats, gates: Floats,
 ) -> Ints:  # fmt: skip
     """Largest jointly compatible set of pairs, of equally large ones the one of least joint distance.
 
@@ -87,26 +87,22 @@ def joint_compatibility(
 
     Parameters
     ----------
-    k : int
-        Number of observations.
-    noises, covariance, by_pose, by_landmark
+    news : ndarray, shape (k,)
+        Logarithm of how many unknown landmarks there are per unit of each observation's measurement.
+    noises, covariance, table, by_pose, by_landmark
         As in :func:`contourslam.slam.gating.compatible_pairs`.
     seen, landmark : ndarray of int, shape (p,)
         Individually compatible pairs, in ascending order of `seen`.
     innovations : ndarray, shape (p, 2)
     gates : ndarray, shape (>= k + 1,)
         ``gates[m]`` is the chi-square gate for m pairs, 2 m degrees of freedom.
-    log_densities : ndarray, shape (k,)
-        Logarithm of how many unknown landmarks there are per unit of each observation's measurement.
-    corner : ndarray of bool, shape (k,)
-        Whether the observation is a corner, whose angle is the second number, or a wall, where it is the first.
 
     Returns
     -------
     ndarray of int, shape (k,)
         Landmark of each observation, or -1.
     """
-    p = seen.size
+    k, p = news.size, seen.size
     chosen = np.full(k, -1, dtype=np.int64)
     if p == 0:
         return chosen
@@ -136,12 +132,12 @@ def joint_compatibility(
                 best_evidence = -distance
                 if size == 1:
                     q = order[0]
-                    a = 2 * q + (1 if corner[seen[q]] else 0)
+                    a = 2 * q + (1 if table[landmark[q], KIND] == CORNER else 0)  # its angle
                     best_angular = s[a, a]
                 for a in range(2 * size):
                     best_evidence -= 2.0 * math.log(lower[a, a])
                 for q in range(size):
-                    best_evidence -= 2.0 * (LOG_TWO_PI + log_densities[seen[order[q]]])
+                    best_evidence -= 2.0 * (LOG_TWO_PI + news[seen[order[q]]])
                 chosen[:] = -1
                 for q in range(size):
                     chosen[seen[order[q]]] = landmark[order[q]]

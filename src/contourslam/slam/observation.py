@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
 from contourslam.kernels import kernel
@@ -25,8 +26,8 @@ class Observations:
     noises : ndarray, shape (k, 2, 2)
         Their covariance.
     looks : ndarray, shape (k, 8)
-        Kind; direction, opening, convex of a corner; two points: of a corner its position and the lengths of its
-        sides, of a wall its ends.
+        Kind; direction (of a wall, that of its normal); opening and convex of a corner; two points: of a corner its
+        position and the lengths of its sides, of a wall its ends.
     """
 
     values: Floats
@@ -38,20 +39,33 @@ class Observations:
 
 
 @kernel
-def _polar(positions: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-    values = np.empty((positions.shape[0], 2))
-    noises = np.empty((positions.shape[0], 2, 2))
-    for i in range(positions.shape[0]):
+def _observe(
+    positions: Floats, covariances: Floats, directions: Floats, openings: Floats, convex: NDArray[np.bool_],
+    sides: Floats, end_points: Floats, lines: Floats, line_covariances: Floats,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    k, w = positions.shape[0], lines.shape[0]
+    share = 2.0 if w > 0 else 1.0
+    values, noises, looks = np.empty((k + w, 2)), np.empty((k + w, 2, 2)), np.zeros((k + w, 8))
+    for i in range(k):
         x, y = positions[i, 0], positions[i, 1]
         q = x * x + y * y
         r = math.sqrt(q)
         values[i, 0], values[i, 1] = r, math.atan2(y, x)
         a, b, c, d = x / r, y / r, -y / q, x / q
-        xx, xy, yy = covariances[i, 0, 0], covariances[i, 0, 1], covariances[i, 1, 1]
+        xx, xy, yy = share * covariances[i, 0, 0], share * covariances[i, 0, 1], share * covariances[i, 1, 1]
         noises[i, 0, 0] = a * a * xx + 2.0 * a * b * xy + b * b * yy
         noises[i, 1, 1] = c * c * xx + 2.0 * c * d * xy + d * d * yy
         noises[i, 0, 1] = noises[i, 1, 0] = a * c * xx + (a * d + b * c) * xy + b * d * yy
-    return values, noises
+        looks[i, KIND], looks[i, DIRECTION], looks[i, OPENING] = CORNER, directions[i], openings[i]
+        looks[i, CONVEX] = 1.0 if convex[i] else 0.0
+        looks[i, X1], looks[i, Y1], looks[i, X2], looks[i, Y2] = x, y, sides[i, 0], sides[i, 1]
+    for i in range(w):
+        j = k + i
+        values[j], noises[j] = lines[i], share * line_covariances[i]
+        looks[j, KIND], looks[j, DIRECTION] = WALL, lines[i, 0]
+        looks[j, X1], looks[j, Y1] = end_points[i, 0]
+        looks[j, X2], looks[j, Y2] = end_points[i, 1]
+    return values, noises, looks
 
 
 def observe(corners: Corners, walls: Walls) -> Observations:
@@ -68,22 +82,12 @@ def observe(corners: Corners, walls: Walls) -> Observations:
     -------
     Observations
     """
-    k = len(corners)
-    values, noises = _polar(corners.positions, corners.covariances)
-    looks = np.empty((k, 8))
-    looks[:, KIND] = CORNER
-    looks[:, DIRECTION], looks[:, OPENING], looks[:, CONVEX] = corners.directions, corners.openings, corners.convex
-    looks[:, X1 : Y1 + 1], looks[:, X2 : Y2 + 1] = corners.positions, corners.sides
-    if len(walls) == 0:
-        return Observations(values, noises, looks)
-    wall_looks = np.zeros((len(walls), 8))
-    wall_looks[:, KIND] = WALL
-    wall_looks[:, X1:] = walls.end_points.reshape(-1, 4)
     return Observations(
-        np.concatenate([values, walls.lines]),
-        np.concatenate([2.0 * noises, 2.0 * walls.covariances]),
-        np.concatenate([looks, wall_looks]),
-    )
+        *_observe(
+            corners.positions, corners.covariances, corners.directions, corners.openings, corners.convex, corners.sides,
+            walls.end_points, walls.lines, walls.covariances,
+        )
+    )  # fmt: skip
 
 
 @kernel
