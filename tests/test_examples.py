@@ -11,6 +11,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SAYS = {
     "01_corners_of_one_scan.py": "curvature_scale_space: 6 corners",
     "02_streaming_slam.py": "map: ",
+    "03_a_fifth_detector.py": "turning angle   RMSE",
     "04_map_a_recording.py": "map.geojson, map.pgm, map.png, map.yaml",
     "05_compare_two_detectors.py": "teh_chin        walls",
 }
