@@ -44,8 +44,8 @@ class ContourConfig:
 
     breakpoint_angle_deg: float = 10.0
     """Shallowest angle between a beam and a surface still followed (lambda of Borges and Aldon 2004), degrees."""
-    breakpoint_sigmas: float = 3.0
-    """Range noise allowed for in the breakpoint distance, in standard deviations."""
+    breakpoint_sigmas: float = 4.5
+    """Range noise allowed for in the breakpoint distance, in standard deviations of one range."""
     max_gap: float = 1.0
     """Two neighbouring points farther apart than this, m, are never one contour."""
     max_missing: int = 2
@@ -104,10 +104,17 @@ class MotionConfig:
     """Standard deviation of the heading after turning by one radian, degrees."""
     lateral_per_sqrt_m: float = 0.03
     """Standard deviation of the sideways slip after one metre, m."""
+    clock_sigma: float = 0.03
+    """Standard deviation of the time by which the odometry's stamps may be off the scans', s."""
 
     def __post_init__(self) -> None:
         _check_positive(
-            self, "forward_per_sqrt_m", "turn_per_sqrt_m_deg", "turn_per_sqrt_rad_deg", "lateral_per_sqrt_m"
+            self,
+            "forward_per_sqrt_m",
+            "turn_per_sqrt_m_deg",
+            "turn_per_sqrt_rad_deg",
+            "lateral_per_sqrt_m",
+            "clock_sigma",
         )
 
 

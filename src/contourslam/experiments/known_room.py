@@ -19,9 +19,13 @@ LEAST_SIGMA = 0.002
 
 
 WHEELS = MotionConfig(
-    forward_per_sqrt_m=0.01, lateral_per_sqrt_m=0.003, turn_per_sqrt_m_deg=0.3, turn_per_sqrt_rad_deg=0.6
+    forward_per_sqrt_m=0.01,
+    lateral_per_sqrt_m=0.003,
+    turn_per_sqrt_m_deg=0.3,
+    turn_per_sqrt_rad_deg=0.6,
+    clock_sigma=0.001,
 )
-"""Odometry noise of the simulated robot: radius and base known to 1 %, which is 0.6 degrees after a turn of 1 rad."""
+"""Odometry noise of the simulated robot: radius and base known to 1 %, 0.6 degrees after a turn of 1 rad; one clock."""
 
 
 def told(config: Config, lidar: LidarModel) -> Config:

@@ -10,7 +10,7 @@ from contourslam.slam.ekf import covariance_block, landmark_columns
 from contourslam.slam.measurement import CORNER, KIND
 
 # A single pair has no other to agree with: its direction must be known this well (rad) beforehand.
-ALONE = 0.12
+ALONE = 0.08
 LOG_TWO_PI = math.log(2.0 * math.pi)
 MOST_NODES = 20_000  # the search ends here with the best set so far
 

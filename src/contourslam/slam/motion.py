@@ -9,7 +9,7 @@ from contourslam.contour.contours import Floats
 from contourslam.kernels import kernel
 
 
-def motion_noise(increment: Floats, config: MotionConfig) -> Floats:
+def motion_noise(increment: Floats, config: MotionConfig, twist_change: Floats | None = None) -> Floats:
     """Covariance of an odometry increment in the frame it starts in (R of eq. 24).
 
     The variances grow with the distance and the angle driven, so that they add up alike over short and long steps.
@@ -19,6 +19,9 @@ def motion_noise(increment: Floats, config: MotionConfig) -> Floats:
     increment : ndarray, shape (3,)
         Forward (m), left (m) and turn (rad) since the last scan.
     config : MotionConfig
+    twist_change : ndarray, shape (3,), optional
+        By how much forward, left (m/s) and turning (rad/s) speed changed since the scan before. Where the clocks of
+        lidar and wheels disagree, a steady motion hides it; starting and stopping shows it.
 
     Returns
     -------
@@ -31,6 +34,10 @@ def motion_noise(increment: Floats, config: MotionConfig) -> Floats:
     lateral = config.lateral_per_sqrt_m**2 * (distance + 0.1 * turn) + 1e-10
     heading = math.radians(config.turn_per_sqrt_m_deg) ** 2 * distance
     heading += math.radians(config.turn_per_sqrt_rad_deg) ** 2 * turn + 1e-10
+    if twist_change is not None:
+        forward += (config.clock_sigma * twist_change[0]) ** 2
+        lateral += (config.clock_sigma * twist_change[1]) ** 2
+        heading += (config.clock_sigma * twist_change[2]) ** 2
     noise = np.zeros((3, 3))
     noise[0, 0], noise[1, 1], noise[2, 2] = forward, lateral, heading
     return noise

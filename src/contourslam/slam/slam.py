@@ -26,6 +26,7 @@ from contourslam.slam.visibility import expected_in_scan
 # twice as many numbers as a pose has.
 SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
 SLIP_PAIRS = 3
+SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
 
 
 def _no_lap(stage: str) -> None:
@@ -79,6 +80,7 @@ class ContourSlam:
         self._odometry = OdometryBuffer()
         self._odometry_at_state: Floats | None = None
         self._linearised_at = self.filter.pose
+        self._stamp, self._twist = -np.inf, np.zeros(3)
         self._nursery = Nursery()
         self._lap = lap
 
@@ -102,7 +104,7 @@ class ContourSlam:
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
-        self._predict(motion)
+        self._predict(scan.stamp, motion)
         seen = observe(found.corners, found.walls)
         world = to_world(self.filter.mean[:3], self.mount, seen.looks)
         model = self._expect()
@@ -141,7 +143,7 @@ class ContourSlam:
         duration = float(scan.offsets.max()) if scan.offsets.size else 0.0
         return self._odometry.during(start, start + duration)
 
-    def _predict(self, motion: tuple[Floats, Floats]) -> None:
+    def _predict(self, stamp: float, motion: tuple[Floats, Floats]) -> None:
         """Move the pose along the odometry to the scan's stamp (eqs 23-24, 28)."""
         if len(motion[0]) == 0:
             return
@@ -149,7 +151,10 @@ class ContourSlam:
         before = now if self._odometry_at_state is None else self._odometry_at_state
         self._odometry_at_state = now
         increment = between_one(before, now)
-        noise = motion_noise(increment, self.config.slam.motion)
+        elapsed = stamp - self._stamp
+        twist = increment / max(elapsed, SHORTEST) if 0.0 < elapsed < np.inf else self._twist
+        noise = motion_noise(increment, self.config.slam.motion, twist - self._twist)
+        self._stamp, self._twist = stamp, twist
         f = self.filter
         start = self._linearised_at if self.config.slam.first_estimates else f.pose
         predict(f.mean, f.covariance, f.size, increment, noise, start)
