@@ -236,6 +236,21 @@ def test_first_estimates_are_a_choice(drive: Drive, mount: Floats) -> None:
     assert np.abs(poses[True] - poses[False]).max() > 1e-9
 
 
+@pytest.mark.parametrize("slip", [(0.3, 0.0, 0.0), (-0.2, 0.25, 0.0), (0.0, 0.1, 0.12)])
+def test_a_slip_of_the_wheels_is_survived(drive: Drive, mount: Floats, slip: tuple[float, ...]) -> None:
+    # From the 40th scan on the wheels are off by a step that never happened.
+    messages = drive(70)
+    wheels = [m.pose for m in messages if isinstance(m, Odometry)]
+    false = compose(compose(wheels[40], np.array(slip)), between(wheels[40], np.zeros(3)))
+    slipped = [
+        replace(m, pose=compose(false, m.pose)) if isinstance(m, Odometry) and i >= 120 else m
+        for i, m in enumerate(messages)
+    ]
+    _, updates = run(WALLS, slipped, mount)
+    assert (rmse(updates[45:], messages[135:]) < [0.02, 0.02, 0.01]).all()
+    assert len(updates[-1].matched) >= 4
+
+
 @pytest.mark.parametrize("name", DETECTORS)
 def test_every_detector_localises(drive: Drive, mount: Floats, name: str) -> None:
     messages = drive(60)
