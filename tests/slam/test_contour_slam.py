@@ -236,7 +236,7 @@ def test_first_estimates_are_a_choice(drive: Drive, mount: Floats) -> None:
     assert np.abs(poses[True] - poses[False]).max() > 1e-9
 
 
-@pytest.mark.parametrize("slip", [(0.3, 0.0, 0.0), (-0.2, 0.25, 0.0), (0.0, 0.1, 0.12)])
+@pytest.mark.parametrize("slip", [(0.3, 0.0, 0.0), (-0.2, 0.25, 0.0), (0.0, 0.1, 0.12), (0.5, 0.3, 0.1)])
 def test_a_slip_of_the_wheels_is_survived(drive: Drive, mount: Floats, slip: tuple[float, ...]) -> None:
     # From the 40th scan on the wheels are off by a step that never happened.
     messages = drive(70)
@@ -247,8 +247,8 @@ def test_a_slip_of_the_wheels_is_survived(drive: Drive, mount: Floats, slip: tup
         for i, m in enumerate(messages)
     ]
     _, updates = run(WALLS, slipped, mount)
-    assert (rmse(updates[45:], messages[135:]) < [0.02, 0.02, 0.01]).all()
-    assert len(updates[-1].matched) >= 4
+    assert len(updates[40].matched) > 0.5 * (updates[40].corners + updates[40].walls)
+    assert (rmse(updates[40:], messages[120:]) < [0.03, 0.03, 0.01]).all()
 
 
 @pytest.mark.parametrize("name", DETECTORS)
