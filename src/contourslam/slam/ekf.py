@@ -72,23 +72,36 @@ def cholesky(matrix: Floats) -> Floats:
 
 @kernel
 def _subtract_gram(covariance: Floats, w: Floats, size: int) -> None:
-    """P -= W^T W on the lower triangle, four rows of W at a time to spare memory traffic."""
+    """P -= W^T W on the lower triangle: two rows of P and four of W at a time, which spares memory traffic.
+
+    The number above the diagonal that comes along with each second row is never read.
+    """
     rank = w.shape[0]
-    for i in range(size):
-        row = covariance[i]
+    even = size - size % 2
+    for i in range(0, even, 2):
+        p, q = covariance[i], covariance[i + 1]
         k = 0
         while k + 4 <= rank:
             a, b, c, d = w[k], w[k + 1], w[k + 2], w[k + 3]
             ai, bi, ci, di = a[i], b[i], c[i], d[i]
-            for j in range(i + 1):
-                row[j] -= ai * a[j] + bi * b[j] + ci * c[j] + di * d[j]
+            aj, bj, cj, dj = a[i + 1], b[i + 1], c[i + 1], d[i + 1]
+            for m in range(i + 2):
+                x, y, z, t = a[m], b[m], c[m], d[m]
+                p[m] -= ai * x + bi * y + ci * z + di * t
+                q[m] -= aj * x + bj * y + cj * z + dj * t
             k += 4
         while k < rank:
             a = w[k]
-            ai = a[i]
-            for j in range(i + 1):
-                row[j] -= ai * a[j]
+            ai, aj = a[i], a[i + 1]
+            for m in range(i + 2):
+                p[m] -= ai * a[m]
+                q[m] -= aj * a[m]
             k += 1
+    for i in range(even, size):
+        for k in range(rank):
+            factor = w[k, i]
+            for m in range(i + 1):
+                covariance[i, m] -= factor * w[k, m]
 
 
 @kernel
