@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from contourslam.cli.console import Bar, chosen, complain, make_way, note, prepare_folder, print_json
@@ -26,7 +27,7 @@ class Compare:
     Example: contourslam compare --seeds 10 --jobs 2 -o out/comparison
     """
 
-    output: Output
+    output: Output = Path("comparison")
     overwrite: Overwrite = False
     room: str = "furnished_room"
     """Room to drive through: furnished_room, office_corridor or large_hall."""
