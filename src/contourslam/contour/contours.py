@@ -38,3 +38,7 @@ class Contours:
 
     def __getitem__(self, index: int) -> Floats:
         return self.points[self.starts[index] : self.starts[index + 1]]
+
+    def points_in(self, length: float, otherwise: int) -> int:
+        """Points that a length (m) spans, at least 2; `otherwise` on raw contours, whose points have no one spacing."""
+        return max(round(length / self.spacing), 2) if self.spacing > 0.0 else otherwise

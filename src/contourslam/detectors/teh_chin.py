@@ -100,13 +100,10 @@ class TehChin:
 
     def reach(self, contours: Contours) -> int:
         """The least support."""
-        return self._points(contours, self.least_support, 1)
-
-    def _points(self, contours: Contours, length: float, otherwise: int) -> int:
-        return max(round(length / contours.spacing), 2) if contours.spacing > 0.0 else otherwise
+        return contours.points_in(self.least_support, 1)
 
     def respond(self, contours: Contours) -> Floats:
         """Curvature of each point, see :class:`contourslam.detectors.Detector`."""
-        least = self._points(contours, self.least_support, 1)
-        most = self._points(contours, self.most_support, 1_000)
+        least = contours.points_in(self.least_support, 1)
+        most = contours.points_in(self.most_support, 1_000)
         return _respond(contours.points, contours.starts, contours.closed, least, most)

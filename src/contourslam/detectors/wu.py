@@ -63,14 +63,11 @@ class Wu:
 
     def reach(self, contours: Contours) -> int:
         """K_min."""
-        return self._points(contours, self.least_support, 3)
-
-    def _points(self, contours: Contours, length: float, otherwise: int) -> int:
-        return max(round(length / contours.spacing), 2) if contours.spacing > 0.0 else otherwise
+        return contours.points_in(self.least_support, 3)
 
     def respond(self, contours: Contours) -> Floats:
         """Mean curvature of each point, see :class:`contourslam.detectors.Detector`."""
-        least = self._points(contours, self.least_support, 3)
-        most = self._points(contours, self.most_support, 12)
+        least = contours.points_in(self.least_support, 3)
+        most = contours.points_in(self.most_support, 12)
         first = least if self.adapted else 1
         return _respond(contours.points, contours.starts, contours.closed, least, most, first)
