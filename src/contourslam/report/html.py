@@ -73,9 +73,7 @@ def write_report(folder: Path, study: Study, *, command: str = "") -> Path:
         lead=headline(study),
         sections=[part for part in parts if part is not None],
         footer=f"Written by contourslam {__version__}.",
-        banner=""
-        if study.complete
-        else "INCOMPLETE: the work was stopped early; this page shows what was done by then.",
+        banner="" if study.complete else _INCOMPLETE,
     )
     write_text(folder / "index.html", text)
     return folder / "index.html"
