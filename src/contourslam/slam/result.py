@@ -46,6 +46,44 @@ class ScanUpdate:
 
 
 @dataclass(frozen=True, slots=True)
+class Loop:
+    """A place recognised, with the evidence for it.
+
+    Attributes
+    ----------
+    earlier_stamp, later_stamp : float
+        Stamps of the two scans that were found to see the same place, s.
+    relative_pose : ndarray, shape (3,)
+        Base at the later scan seen from the base at the earlier: m, m, rad.
+    covariance : ndarray, shape (3, 3)
+        Of `relative_pose`, in its own frame.
+    shift : ndarray, shape (3,)
+        By how much the estimate before the loop was off, in the frame of the later base: m, m, rad.
+    method : str
+        What proposed it: "search" (contours, inside the pose's uncertainty) or "constellation" (corners and walls).
+    pairs : int
+        Contour points, or landmarks, that were paired.
+    residual : float
+        Root mean square of the pairs' distances, m.
+    overlap : float
+        Part of the later scan's contour points that found a partner, in [0, 1].
+    runner_up : float
+        Score of the best other alignment as a part of this one's, in [0, 1]; near 1 the place is ambiguous.
+    """
+
+    earlier_stamp: float
+    later_stamp: float
+    relative_pose: Floats
+    covariance: Floats
+    shift: Floats
+    method: str
+    pairs: int
+    residual: float
+    overlap: float
+    runner_up: float
+
+
+@dataclass(frozen=True, slots=True)
 class RunResult:
     """A recording replayed through the filter; one row per scan.
 
@@ -75,6 +113,14 @@ class RunResult:
         Scans and readings that could not be used, by reason.
     complete : bool
         False where the run was interrupted or the recording ended in an error; what was done before is kept.
+    back_end : str
+        "ekf" or "graph".
+    online_poses : ndarray, shape (t, 3), or None
+        The pose as it was known at the time of each scan; None where `poses` is that already.
+    quality : ndarray, shape (t,), or None
+        How well each scan's contours fitted the local map, in [0, 1]: 0 where nothing matched; None without matching.
+    loops : tuple of Loop
+        Every loop that was closed.
     """
 
     detector: str
@@ -93,3 +139,7 @@ class RunResult:
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: dict[str, int] = field(default_factory=dict)
     complete: bool = True
+    back_end: str = "ekf"
+    online_poses: Floats | None = None
+    quality: Floats | None = None
+    loops: tuple[Loop, ...] = ()
