@@ -91,24 +91,58 @@ def relation_errors(
     ValueError
         If shapes disagree, the trajectory has fewer than two poses, or only one half of the odometry is given.
     """
-    trajectory = _sorted("the trajectory", stamps, poses)
-    if (odometry_stamps is None) != (odometry_poses is None):
-        raise ValueError("give both stamps and poses of the odometry, or neither")
-    odometry = None
-    if odometry_stamps is not None and odometry_poses is not None:
-        odometry = _sorted("the odometry", odometry_stamps, odometry_poses)
     if relation_stamps.shape != (len(relation_poses), 2) or relation_poses.shape != (len(relation_stamps), 3):
         raise ValueError(
             f"relation stamps {relation_stamps.shape} and poses {relation_poses.shape} must be (n, 2) and (n, 3)"
         )
-    first = _poses_at(relation_stamps[:, 0], trajectory, odometry)
-    second = _poses_at(relation_stamps[:, 1], trajectory, odometry)
+    first, second = (
+        poses_at(relation_stamps[:, end], stamps, poses, odometry_stamps, odometry_poses) for end in (0, 1)
+    )
     difference = between(relation_poses, between(first, second))
-    ends = trajectory[0]
-    beyond = (relation_stamps < ends[0] - _NEAR) | (relation_stamps > ends[-1] + _NEAR)
+    beyond = (relation_stamps < stamps.min() - _NEAR) | (relation_stamps > stamps.max() + _NEAR)
     return RelationErrors(
         np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2]), int(beyond.any(axis=1).sum())
     )
+
+
+def poses_at(
+    wanted: Floats,
+    stamps: Floats,
+    poses: Floats,
+    odometry_stamps: Floats | None = None,
+    odometry_poses: Floats | None = None,
+) -> Floats:
+    """Poses of a trajectory at other times than its own, as the relation metric takes them.
+
+    Parameters
+    ----------
+    wanted : ndarray, shape (n,)
+        s.
+    stamps, poses, odometry_stamps, odometry_poses
+        As :func:`relation_errors`.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+
+    Raises
+    ------
+    ValueError
+        As :func:`relation_errors`, where it is about trajectory and odometry.
+    """
+    stamps, poses = trajectory = _sorted("the trajectory", stamps, poses)
+    if (odometry_stamps is None) != (odometry_poses is None):
+        raise ValueError("give both stamps and poses of the odometry, or neither")
+    after = np.clip(np.searchsorted(stamps, wanted), 1, len(stamps) - 1)
+    nearest = np.where(wanted - stamps[after - 1] <= stamps[after] - wanted, after - 1, after)
+    near = np.abs(stamps[nearest] - wanted) <= _NEAR
+    if odometry_stamps is None or odometry_poses is None:
+        carried = _interpolate(trajectory, wanted)
+    else:
+        odometry = _sorted("the odometry", odometry_stamps, odometry_poses)
+        moved = between(_interpolate(odometry, stamps[nearest]), _interpolate(odometry, wanted))
+        carried = compose(poses[nearest], moved)
+    return np.where(near[:, None], poses[nearest], carried)
 
 
 def _sorted(name: str, stamps: Floats, poses: Floats) -> tuple[Floats, Floats]:
@@ -116,20 +150,6 @@ def _sorted(name: str, stamps: Floats, poses: Floats) -> tuple[Floats, Floats]:
         raise ValueError(f"{name} needs two poses or more, got stamps {stamps.shape} and poses {poses.shape}")
     order = np.argsort(stamps, kind="stable")
     return stamps[order], poses[order]
-
-
-def _poses_at(wanted: Floats, trajectory: tuple[Floats, Floats], odometry: tuple[Floats, Floats] | None) -> Floats:
-    stamps, poses = trajectory
-    after = np.clip(np.searchsorted(stamps, wanted), 1, len(stamps) - 1)
-    nearest = np.where(wanted - stamps[after - 1] <= stamps[after] - wanted, after - 1, after)
-    near = np.abs(stamps[nearest] - wanted) <= _NEAR
-    if odometry is None:
-        carried = _interpolate(trajectory, wanted)
-    else:
-        carried = compose(
-            poses[nearest], between(_interpolate(odometry, stamps[nearest]), _interpolate(odometry, wanted))
-        )
-    return np.where(near[:, None], poses[nearest], carried)
 
 
 def _interpolate(track: tuple[Floats, Floats], wanted: Floats) -> Floats:
