@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from contourslam.scan import LaserScan, evenly_spaced
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import FURNISHED_ROOM
 from contourslam.slam.landmark_map import CornerMap, WallMap
-from contourslam.slam.result import RunResult
+from contourslam.slam.result import Loop, RunResult
 
 ROOM = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
 
@@ -83,6 +84,40 @@ def make_run() -> Callable[..., RunResult]:
             seconds={"contour": 0.02 * scans / 300, "detection": 0.05, "refinement": 0.02, "correction": 0.04},
             skipped={},
             complete=complete,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_graph_run(make_run) -> Callable[..., RunResult]:
+    """The same drive as the graph back end would hand it on: online poses, matching quality and closed loops."""
+
+    def make(seed: int = 0, scans: int = 300, loops: int = 5) -> RunResult:
+        run = make_run(seed=seed, scans=scans)
+        rng = np.random.default_rng(seed + 1000)
+        half = scans // 2
+        closed = tuple(
+            Loop(
+                earlier_stamp=float(run.stamps[i * half // loops]),
+                later_stamp=float(run.stamps[half + i * half // loops]),
+                relative_pose=between(run.poses[i * half // loops], run.poses[half + i * half // loops]),
+                covariance=np.diag([1e-4, 2e-4, 3e-6]) + 1e-7,
+                shift=np.array([0.4 / (1 + i), -0.1, 0.02]) * (-1) ** i,
+                method="constellation" if i % 2 else "search",
+                pairs=int(rng.integers(40, 200)),
+                residual=float(rng.uniform(0.005, 0.02)),
+                overlap=float(rng.uniform(0.5, 1.0)),
+                runner_up=float(rng.uniform(0.0, 0.9)),
+            )
+            for i in range(loops)
+        )
+        return replace(
+            run,
+            back_end="graph",
+            online_poses=run.poses + np.array([0.02, 0.02, 0.004]) * rng.standard_normal((scans, 3)),
+            quality=np.clip(rng.normal(0.9, 0.05, scans), 0.0, 1.0),
+            loops=closed,
         )
 
     return make

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import resource
 import sys
@@ -73,6 +74,50 @@ def test_a_truth_with_gaps_keeps_its_gaps(tmp_path, make_run):
     np.testing.assert_allclose(read_result_folder(tmp_path).result.truth, run.truth, atol=1e-9)
 
 
+def test_what_the_graph_adds_comes_back_too(tmp_path, make_graph_run):
+    run = make_graph_run()
+    written(tmp_path, run)
+    back = read_result_folder(tmp_path).result
+    assert back.back_end == "graph"
+    np.testing.assert_allclose(back.online_poses, run.online_poses, atol=1e-9)
+    np.testing.assert_allclose(back.quality, run.quality, rtol=1e-9)
+    assert len(back.loops) == len(run.loops) == 5
+    for found, wanted in zip(back.loops, run.loops, strict=True):
+        for name in (field.name for field in dataclasses.fields(wanted)):
+            value = getattr(wanted, name)
+            if isinstance(value, str | int):
+                assert getattr(found, name) == value
+            else:
+                np.testing.assert_allclose(getattr(found, name), value, rtol=1e-9, atol=1e-15, err_msg=name)
+        assert found.later_stamp == wanted.later_stamp  # stamps to the bit: they are looked up by them
+
+
+def test_a_folder_from_before_there_were_loops_still_loads(tmp_path, make_run):
+    written(tmp_path, make_run())
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    del metrics["back_end"]
+    (tmp_path / "metrics.json").write_text(json.dumps(metrics))
+    back = read_result_folder(tmp_path).result
+    assert (back.back_end, back.online_poses, back.quality, back.loops) == ("ekf", None, None, ())
+
+
+def test_a_run_without_loops_leaves_none_of_an_earlier_run(tmp_path, make_run, make_graph_run):
+    written(tmp_path, make_graph_run())
+    assert {"loops.csv", "trajectory_online.tum"} <= {path.name for path in tmp_path.iterdir()}
+    written(tmp_path, make_run())
+    assert not {"loops.csv", "trajectory_online.tum"} & {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("quality", [True, False])
+@pytest.mark.parametrize("truth", [True, False])
+def test_every_choice_of_known_columns_comes_back(tmp_path, make_graph_run, truth, quality):
+    run = make_graph_run(scans=20)
+    run = dataclasses.replace(run, truth=run.truth if truth else None, quality=run.quality if quality else None)
+    written(tmp_path, run)
+    back = read_result_folder(tmp_path).result
+    assert (back.truth is not None, back.quality is not None) == (truth, quality)
+
+
 def test_an_incomplete_run_says_so(tmp_path, make_run):
     written(tmp_path, make_run(complete=False))
     assert json.loads((tmp_path / "metrics.json").read_text())["complete"] is False
@@ -98,6 +143,25 @@ def test_a_damaged_line_of_the_scan_table_is_numbered(tmp_path, make_run, line):
     lines[4] = line
     (tmp_path / "scans.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(ResultError, match=r"scans\.csv: line 5 "):
+        read_result_folder(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "place"),
+    [
+        ("loops.csv", lambda lines: [*lines[:2], lines[2].replace("constellation,", "constellation,many")], "line 3"),
+        ("loops.csv", lambda lines: [*lines[:2], lines[2] + ",1"], "line 3"),
+        ("loops.csv", lambda lines: lines[1:], "line 1"),
+        ("loops.csv", lambda lines: ["\0"], "loops"),
+        ("trajectory_online.tum", lambda lines: lines[:-3], "297 poses"),
+        ("trajectory_online.tum", lambda lines: [*lines, "1 2"], "line 301"),
+    ],
+)
+def test_damage_to_loops_and_online_poses_is_named_by_place(tmp_path, make_graph_run, name, damage, place):
+    written(tmp_path, make_graph_run())
+    path = tmp_path / name
+    path.write_text("\n".join(damage(path.read_text().splitlines())) + "\n")
+    with pytest.raises(ResultError, match=f"{name.replace('.', '[.]')}: .*{place}"):
         read_result_folder(tmp_path)
 
 

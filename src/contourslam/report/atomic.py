@@ -22,6 +22,20 @@ def make_folder(folder: Path) -> None:
         raise ResultError(f"{folder}: cannot be made ({error.strerror or error}); choose another folder") from error
 
 
+def remove(path: Path) -> None:
+    """Remove a file, where there is one.
+
+    Raises
+    ------
+    ResultError
+        If it cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be removed ({error.strerror or error})") from error
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path to write to, and move it to `path` once the block has ended well.

@@ -7,19 +7,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam import __version__
 from contourslam.config import Config
-from contourslam.errors import MissingExtraError, ResultError
-from contourslam.recordings.trajectories import write_trajectory
-from contourslam.report.atomic import make_folder, write_text
+from contourslam.errors import MissingExtraError, RecordingError, ResultError
+from contourslam.recordings.trajectories import read_trajectory, write_trajectory
+from contourslam.report.atomic import make_folder, remove, write_text
 from contourslam.report.config_file import read_config, write_config
+from contourslam.report.loop_table import read_loop_table, write_loop_table
 from contourslam.report.map_files import write_geojson
 from contourslam.report.map_reader import read_geojson
 from contourslam.report.nav2_map import write_nav2_map
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.scan_table import read_scan_table, write_scan_table
 from contourslam.slam.result import RunResult
+
+ONLINE = "trajectory_online.tum"
+LOOPS = "loops.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +72,8 @@ def write_result_folder(
 ) -> tuple[str, ...]:
     """Write what a run leaves behind; files of the same names are replaced, others are left alone.
 
+    ``trajectory_online.tum`` and ``loops.csv`` are there only where the run has online poses and loops.
+
     Parameters
     ----------
     folder : Path
@@ -96,6 +103,14 @@ def write_result_folder(
     write_trajectory(folder / "trajectory.tum", result.stamps, result.poses)
     write_scan_table(folder / "scans.csv", result)
     write_geojson(folder / "map.geojson", result.corner_map, result.wall_map)
+    if result.online_poses is None:
+        remove(folder / ONLINE)  # an earlier run's would not belong to this one
+    else:
+        write_trajectory(folder / ONLINE, result.stamps, result.online_poses)
+    if result.loops:
+        write_loop_table(folder / LOOPS, result.loops)
+    else:
+        remove(folder / LOOPS)
     write_config(folder / "config.yaml", config, header=f"contourslam {__version__}\n{command}".strip())
     if grid is not None:
         write_nav2_map(folder, grid)
@@ -104,6 +119,7 @@ def write_result_folder(
         "command": command,
         "complete": result.complete,
         "detector": result.detector,
+        "back_end": result.back_end,
         "scans": len(result.stamps),
         "corners": len(result.corner_map.ids),
         "walls": len(result.wall_map.ids),
@@ -136,16 +152,32 @@ def read_result_folder(folder: Path) -> StoredRun:
         )
     metrics = read_metrics(folder / "metrics.json")
     corners, walls = read_geojson(folder / "map.geojson")
+    scans = read_scan_table(folder / "scans.csv")
     result = dataclasses.replace(
-        read_scan_table(folder / "scans.csv"),
+        scans,
         detector=str(metrics.get("detector", "")),
         corner_map=corners,
         wall_map=walls,
         seconds=dict(metrics.get("seconds") or {}),
         skipped=dict(metrics.get("skipped") or {}),
         complete=metrics.get("complete") is True,
+        back_end=str(metrics.get("back_end", "ekf")),  # the only one there was before it was written down
+        online_poses=_online_poses(folder / ONLINE, len(scans.stamps)),
+        loops=read_loop_table(folder / LOOPS),
     )
     return StoredRun(result, read_config(folder / "config.yaml"), metrics)
+
+
+def _online_poses(path: Path, scans: int) -> NDArray[np.float64] | None:
+    if not path.exists():
+        return None
+    try:
+        _, poses = read_trajectory(path)
+    except RecordingError as error:
+        raise ResultError(str(error)) from error
+    if len(poses) != scans:
+        raise ResultError(f"{path}: holds {len(poses)} poses where scans.csv holds {scans} scans; run it again")
+    return poses
 
 
 def read_metrics(path: Path) -> dict[str, Any]:

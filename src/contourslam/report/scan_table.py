@@ -16,6 +16,7 @@ _POSE = ("x", "y", "theta")
 _COVARIANCE = ("xx", "xy", "xtheta", "yy", "ytheta", "thetatheta")
 _COUNTS = ("nis_dof", "matched", "corners", "walls")
 _TRUTH = tuple(f"true_{name}" for name in _POSE)
+_QUALITY = ("quality",)
 COLUMNS = (
     "stamp",
     *_POSE,
@@ -24,7 +25,7 @@ COLUMNS = (
     "nis",
     *_COUNTS,
 )
-"""Columns of the table in m, rad, s; the true pose follows where it is known."""
+"""Columns of the table in m, rad, s; the true pose and the quality of the contour matching follow where known."""
 _UPPER = np.triu_indices(3)
 
 _NONE = np.zeros(0, dtype=np.int64)
@@ -37,7 +38,7 @@ EMPTY_WALLS = WallMap(
 
 
 def write_scan_table(path: Path, result: RunResult) -> None:
-    """Write one line per scan: stamp, pose, covariance, raw odometry, innovation, counts and, if known, the truth.
+    """Write one line per scan: stamp, pose, covariance, raw odometry, innovation, counts, and what else is known.
 
     Raises
     ------
@@ -48,9 +49,13 @@ def write_scan_table(path: Path, result: RunResult) -> None:
     columns = [result.poses, upper, result.odometry, result.nis[:, None]]
     counts = [result.nis_dof, result.matched_count, result.corner_count, result.wall_count]
     columns += [count[:, None].astype(np.float64) for count in counts]
-    columns += [] if result.truth is None else [result.truth]
+    names = COLUMNS
+    if result.truth is not None:
+        columns, names = [*columns, result.truth], names + _TRUTH
+    if result.quality is not None:
+        columns, names = [*columns, result.quality[:, None]], names + _QUALITY
     text = io.StringIO()
-    text.write(",".join(COLUMNS + (() if result.truth is None else _TRUTH)) + "\n")
+    text.write(",".join(names) + "\n")
     for stamp, row in zip(result.stamps, np.concatenate(columns, axis=1), strict=True):
         text.write(",".join([repr(float(stamp)), *(f"{value:.10g}" for value in row)]) + "\n")
     write_text(path, text.getvalue())
@@ -62,7 +67,7 @@ def read_scan_table(path: Path) -> RunResult:
     Returns
     -------
     RunResult
-        With its per-scan arrays; the map is empty and the detector has no name, the table holds neither.
+        With its per-scan arrays, but for the online poses; the map is empty and the detector has no name.
 
     Raises
     ------
@@ -76,7 +81,7 @@ def read_scan_table(path: Path) -> RunResult:
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: is not a table of scans ({error})") from error
     names = tuple(lines[0]) if lines else ()
-    if names not in (COLUMNS, COLUMNS + _TRUTH):
+    if names not in (COLUMNS, COLUMNS + _TRUTH, COLUMNS + _QUALITY, COLUMNS + _TRUTH + _QUALITY):
         raise ResultError(
             f"{path}: line 1 is not the header of a table of scans; write it again with `contourslam run`"
         )
@@ -108,4 +113,5 @@ def _result(table: dict[str, NDArray[np.float64]]) -> RunResult:
         wall_count=walls,
         corner_map=EMPTY_CORNERS,
         wall_map=EMPTY_WALLS,
+        quality=table.get(_QUALITY[0]),
     )
