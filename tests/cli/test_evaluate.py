@@ -1,4 +1,5 @@
 import json
+import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from contourslam.cli import main
-from contourslam.recordings import write_trajectory
+from contourslam.recordings import read_trajectory, write_trajectory
 
 Failure = Callable[..., str]
 
@@ -41,6 +42,28 @@ def test_folders_stand_side_by_side(mapped: Path, tmp_path: Path, capsys: pytest
     first, second = row.split()[-2:]
     assert first == second
     assert float(first) < 0.02
+
+
+def test_the_online_poses_are_judged_beside_the_refined(
+    mapped: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    relations = tmp_path / "truth.relations"
+    relations.write_text(f"100.0 110.0 {0.8 * np.sin(2.5)} {0.8 * (1 - np.cos(2.5))} 0 0 0 2.5\n")
+    folder = tmp_path / "refined"
+    shutil.copytree(mapped, folder)
+    stamps, poses = read_trajectory(folder / "trajectory.tum")
+    poses[20:, 0] += 0.25
+    poses[20:, 2] += math.radians(3.0)
+    write_trajectory(folder / "trajectory_online.tum", stamps, poses)
+    assert main(["evaluate", str(folder), "--relations", str(relations), "--json"]) == 0
+    metrics = json.loads(capsys.readouterr().out)[str(folder)]
+    assert metrics["relations"]["translation"]["mean"] < 0.02
+    assert metrics["online_relations"]["translation"]["mean"] == pytest.approx(0.25, abs=0.02)
+    assert main(["evaluate", str(folder), "--relations", str(relations)]) == 0
+    rows = dict(line.rsplit(None, 1) for line in capsys.readouterr().out.splitlines()[1:])
+    assert float(rows["online relation error, median, m"]) == pytest.approx(0.25, abs=0.02)
+    assert float(rows["online relation error, rotation, mean, deg"]) == pytest.approx(3.0, abs=0.3)
+    assert float(rows["relation error, rotation, mean, deg"]) < 0.5
 
 
 def test_a_truth_of_another_clock_says_so(failure: Failure, mapped: Path, tmp_path: Path) -> None:

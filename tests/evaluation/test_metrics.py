@@ -7,11 +7,11 @@ import pytest
 from contourslam.evaluation.cramer_rao import CramerRaoBound
 from contourslam.evaluation.detection import DetectionScore
 from contourslam.evaluation.metrics import aggregate, run_metrics
-from contourslam.evaluation.relations import RelationErrors
+from contourslam.evaluation.relations import JudgedRelations, RelationErrors
 from contourslam.geometry.poses import compose
 
 KEYS = {
-    "detector", "scans", "complete", "skipped", "rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside",
+    "detector", "back_end", "loops", "quality", "scans", "complete", "skipped", "rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside",
     "inside_two_sigma", "nis", "nis_inside", "fnr", "fnr_median", "fnr_walls", "fnr_walls_median", "landmarks",
     "per_scan", "seconds", "scans_per_second",
 }  # fmt: skip
@@ -50,7 +50,7 @@ def test_without_truth_the_errors_are_unknown_and_the_rest_is_kept(make_run):
     found = run_metrics(make_run(truth=None))
     unknown = {key for key in KEYS if found[key] is None}
     unknown_here = {"rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside", "inside_two_sigma"}
-    assert unknown == unknown_here | {"fnr_walls", "fnr_walls_median"}
+    assert unknown == unknown_here | {"fnr_walls", "fnr_walls_median", "quality"}
 
 
 def test_a_truth_in_another_frame_is_aligned_at_the_first_pose(make_run):
@@ -75,11 +75,12 @@ def test_a_truth_in_another_frame_is_aligned_at_the_first_pose(make_run):
 
 
 def test_relations_bound_and_detection_are_reported_if_given(make_run):
-    relations = RelationErrors(np.array([0.1, 0.3]), np.array([0.0, 0.2]), 1)
+    errors = RelationErrors(np.array([0.1, 0.3]), np.array([0.0, 0.2]), 1)
+    relations = JudgedRelations(np.zeros((2, 2)), errors, None, errors)
     bound = CramerRaoBound(np.full((4, 3), np.inf), np.tile([0.001, 0.002, 0.003], (4, 1)))
     ones = np.ones(4, dtype=np.int64)
     detection = DetectionScore(2 * ones, ones, ones, ones, np.full(4, 0.01), np.empty(0), 4, 3)
-    found = run_metrics(make_run(), relations=relations, odometry_relations=relations, bound=bound, detection=detection)
+    found = run_metrics(make_run(), relations=relations, bound=bound, detection=detection)
     assert found["relations"]["translation"] == pytest.approx({"mean": 0.2, "sd": 0.1, "median": 0.2, "max": 0.3})
     assert found["odometry_relations"]["outside"] == 1
     assert found["cramer_rao"] == {

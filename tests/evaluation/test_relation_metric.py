@@ -2,6 +2,7 @@ import lzma
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contourslam.evaluation.relations import relation_errors
+from contourslam.evaluation.relations import judge, relation_errors
 from contourslam.geometry.poses import between, compose, interpolate
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -177,3 +178,20 @@ def test_interpolation_agrees_with_the_common_one_where_stamps_do_not_repeat():
     near = np.abs(stamps[:, None, None] - wanted).min(axis=0) <= 0.001
     assert (~near).all(axis=1).sum() > 20
     np.testing.assert_allclose(errors.translation[~near.any(axis=1)], 0.0, atol=1e-9)
+
+
+def test_a_run_is_judged_with_its_online_poses_and_its_wheels(make_run):
+    run = make_run()
+    stamps = np.stack([run.stamps[:-10], run.stamps[10:]], axis=-1)
+    poses = between(run.truth[:-10], run.truth[10:])
+    plain = judge(run, stamps, poses)
+    assert plain.online is None
+    assert 0.01 < plain.estimate.translation.mean() < 0.05
+    assert plain.odometry.translation.max() < 1e-9  # this run's wheels are perfect
+    worse = run.poses + np.array([0.5, 0.0, 0.0]) * (np.arange(len(run.stamps)) % 20 < 10)[:, None]
+    judged = judge(replace(run, online_poses=worse), stamps, poses)
+    assert judged.online is not None
+    np.testing.assert_array_equal(judged.estimate.translation, plain.estimate.translation)
+    assert judged.online.translation.mean() == pytest.approx(0.5, rel=0.2)
+    finer = judge(run, stamps, poses, run.stamps, 1.1 * run.truth)
+    assert finer.odometry.translation.mean() > 0.05

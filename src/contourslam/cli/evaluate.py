@@ -1,5 +1,6 @@
 """``contourslam evaluate``: a result folder judged, again or by something new."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,7 +9,7 @@ import tyro
 
 from contourslam.cli.console import print_json
 from contourslam.cli.options import Json
-from contourslam.errors import RecordingError
+from contourslam.errors import RecordingError, ResultError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 class Evaluate:
     """Judge a result folder by true poses or by known relative poses; two folders or more are compared side by side.
 
+    Where the run has been refined at its end, the figures of the poses as known at the time stand beside it (online).
     Truth that the recording held is used by itself. metrics.json is left as it is; --json prints the new figures.
 
     Example: contourslam evaluate out/intel --relations intel.relations.xz
@@ -47,24 +49,22 @@ class Evaluate:
 
     def _measure(self, folder: Path) -> dict[str, Any]:
         from contourslam.evaluation.metrics import run_metrics
-        from contourslam.evaluation.relations import relation_errors
+        from contourslam.evaluation.relations import judge
         from contourslam.recordings import read_relations
         from contourslam.report.result_folder import read_result_folder
 
         result = read_result_folder(folder).result
         if self.truth is not None:
             result = _with_truth(result, self.truth)
-        if self.relations is None:
-            return run_metrics(result, aligned=self.truth is not None)
-        stamps, poses = read_relations(self.relations)
-        if stamps.max() < result.stamps.min() or stamps.min() > result.stamps.max():
-            raise _no_overlap(self.relations, stamps, result)
-        return run_metrics(
-            result,
-            aligned=self.truth is not None,
-            relations=relation_errors(result.stamps, result.poses, stamps, poses, result.stamps, result.odometry),
-            odometry_relations=relation_errors(result.stamps, result.odometry, stamps, poses),
-        )
+        judged = None
+        if self.relations is not None:
+            stamps, poses = read_relations(self.relations)
+            if stamps.max() < result.stamps.min() or stamps.min() > result.stamps.max():
+                raise _no_overlap(self.relations, stamps, result)
+            if len(result.stamps) < 2:
+                raise ResultError(f"{folder}: holds a single scan, which no relation can judge; run more of them")
+            judged = judge(result, stamps, poses)
+        return run_metrics(result, aligned=self.truth is not None, relations=judged)
 
 
 def _with_truth(result: "RunResult", path: Path) -> "RunResult":
@@ -90,8 +90,9 @@ def _no_overlap(path: Path, stamps: "Floats", result: "RunResult") -> RecordingE
     )
 
 
-# What is printed: title, unit, and where it stands in the metrics.
+# What is printed: title, unit, and where it stands in the metrics; rad are printed in degrees where the unit says so.
 _ROWS = (
+    ("back end", "", ("back_end",)),
     ("RMSE x", "m", ("rmse", "x")),
     ("RMSE y", "m", ("rmse", "y")),
     ("RMSE heading", "rad", ("rmse", "theta")),
@@ -101,8 +102,14 @@ _ROWS = (
     ("NIS per degree of freedom (ideal 1)", "", ("nis",)),
     ("relation error, mean", "m", ("relations", "translation", "mean")),
     ("relation error, median", "m", ("relations", "translation", "median")),
-    ("relation error, mean", "rad", ("relations", "rotation", "mean")),
+    ("relation error, rotation, mean", "deg", ("relations", "rotation", "mean")),
+    ("online relation error, mean", "m", ("online_relations", "translation", "mean")),
+    ("online relation error, median", "m", ("online_relations", "translation", "median")),
+    ("online relation error, rotation, mean", "deg", ("online_relations", "rotation", "mean")),
     ("raw odometry's relation error, mean", "m", ("odometry_relations", "translation", "mean")),
+    ("raw odometry's rel. error, rotation, mean", "deg", ("odometry_relations", "rotation", "mean")),
+    ("loops closed", "", ("loops",)),
+    ("quality of the contour matching", "", ("quality",)),
     ("false-negative rate of corners", "", ("fnr",)),
     ("false-negative rate of walls", "", ("fnr_walls",)),
     ("corners in the map", "", ("landmarks", "corners")),
@@ -115,20 +122,22 @@ _ROWS = (
 def _print_table(metrics: dict[str, dict[str, Any]]) -> None:
     """Print a row per figure that some folder has, a column per folder."""
     width = max(12, *(len(name) for name in metrics))
-    print(" " * 46 + "".join(f"{name:>{width + 2}}" for name in metrics))
+    print(" " * 48 + "".join(f"{name:>{width + 2}}" for name in metrics))
     for title, unit, keys in _ROWS:
-        cells = [_cell(run, keys) for run in metrics.values()]
+        cells = [_cell(run, keys, in_degrees=unit == "deg") for run in metrics.values()]
         if any(cells):
             print(
-                f"{title + (f', {unit}' if unit else ''):<46}"
+                f"{title + (f', {unit}' if unit else ''):<48}"
                 + "".join(f"{cell or '-':>{width + 2}}" for cell in cells)
             )
 
 
-def _cell(run: dict[str, Any], keys: tuple[str, ...]) -> str:
+def _cell(run: dict[str, Any], keys: tuple[str, ...], *, in_degrees: bool) -> str:
     value: Any = run
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
     if value is None:
         return ""
-    return str(value) if isinstance(value, int) else f"{value:.4g}"
+    if isinstance(value, int | str):
+        return str(value)
+    return f"{math.degrees(value) if in_degrees else value:.4g}"

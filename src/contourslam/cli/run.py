@@ -1,5 +1,6 @@
 """``contourslam run``: a recording to a trajectory and a map."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from contourslam.evaluation.relations import JudgedRelations
     from contourslam.recordings import Message, Recording
     from contourslam.report.occupancy import OccupancyGrid
     from contourslam.slam.result import RunResult
@@ -148,8 +150,8 @@ def _run(options: Run, command: str) -> int:
     complete = result.complete and not messages.interrupted
     result = replace(result, complete=complete, skipped={**recording.skipped, **result.skipped})
     if len(result.stamps):
-        errors = {} if relations is None else _judge(result, reading, *relations)
-        metrics = run_metrics(result, **errors)
+        judged = None if relations is None else _judge(result, reading, *relations)
+        metrics = run_metrics(result, relations=judged)
         grid = None if options.no_grid else _grid(reading, result, options.settings, recording)
         notes = write_result_folder(options.output, result, options.settings, metrics, grid=grid, command=command)
         if grid is None:  # an earlier run's would not belong to this one
@@ -167,17 +169,15 @@ def _run(options: Run, command: str) -> int:
     return 0
 
 
-def _judge(result: "RunResult", reading: _Reading, stamps: "Floats", poses: "Floats") -> dict[str, Any]:
-    """Hold the trajectory and raw odometry against known relative poses."""
+def _judge(result: "RunResult", reading: _Reading, stamps: "Floats", poses: "Floats") -> "JudgedRelations | None":
+    """Hold the trajectory and raw odometry against known relative poses; a single scan has nothing to show."""
     import numpy as np
 
-    from contourslam.evaluation.relations import relation_errors
+    from contourslam.evaluation.relations import judge
 
-    wheels = np.array(reading.odometry_stamps), np.array(reading.odometry_poses)
-    return {
-        "relations": relation_errors(result.stamps, result.poses, stamps, poses, *wheels),
-        "odometry_relations": relation_errors(*wheels, stamps, poses),
-    }
+    if len(result.stamps) < 2:
+        return None
+    return judge(result, stamps, poses, np.array(reading.odometry_stamps), np.array(reading.odometry_poses))
 
 
 def _grid(reading: _Reading, result: "RunResult", config: Config, recording: "Recording") -> "OccupancyGrid":
@@ -211,7 +211,14 @@ def _tell(options: Run, metrics: dict[str, Any]) -> None:
             f"(raw odometry {raw['x']:.3f}, {raw['y']:.3f}, {raw['theta']:.4f})"
         )
     if "relations" in metrics:
-        ours, raw = (metrics[key]["translation"]["mean"] for key in ("relations", "odometry_relations"))
-        print(f"relation error: {ours:.3f} m mean (raw odometry {raw:.3f})")
+        print(f"relation error: {_relation_error(metrics['relations'])}")
+        if "online_relations" in metrics:
+            print(f"  as known at the time (online): {_relation_error(metrics['online_relations'])}")
+        print(f"  raw odometry: {_relation_error(metrics['odometry_relations'])}")
     for reason, count in metrics["skipped"].items():
         print(f"skipped {count}: {reason}")
+
+
+def _relation_error(errors: dict[str, Any]) -> str:
+    translation, rotation = errors["translation"], math.degrees(errors["rotation"]["mean"])
+    return f"{translation['mean']:.4f} m mean, {translation['median']:.4f} m median, {rotation:.2f}° mean"

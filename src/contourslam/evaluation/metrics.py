@@ -22,8 +22,12 @@ Schema of one run (SI units, angles in rad; null where a quantity is not known o
     Size of the final map; what one scan gave on average.
 ``seconds``, ``scans_per_second``
     Time per stage; scans over their sum.
-``relations``, ``odometry_relations``: ``.count``, ``.outside``; ``.translation.mean``, ``.sd``, ``.median``, ``.max``
-    Relation metric, if given; ``.outside`` counts those beyond the ends of the trajectory; ``.rotation`` likewise.
+``back_end``, ``loops``, ``quality``
+    What estimated it, how many loops were closed, and the mean quality of the contour matching.
+``relations``, ``online_relations``, ``odometry_relations``
+    Relation metric, if given, of the trajectory, of the poses known at the time and of raw odometry: ``.count``,
+    ``.outside`` (those beyond the ends of the trajectory), ``.translation.mean``, ``.sd``, ``.median``, ``.max``;
+    ``.rotation`` likewise.
 ``cramer_rao.scan``, ``cramer_rao.filtered``: ``.x``, ``.y``, ``.theta``
     Bound of localisation in the known room, RMS over the run, if given.
 ``detection.precision``, ``.recall``, ``.repeatability``, ``.mean_error``, ``.rms_error``, ``.raw_*_error``
@@ -44,7 +48,7 @@ from contourslam.evaluation.cramer_rao import CramerRaoBound
 from contourslam.evaluation.detection import DetectionScore
 from contourslam.evaluation.errors import align_first, pose_errors, rmse
 from contourslam.evaluation.false_negatives import false_negatives
-from contourslam.evaluation.relations import RelationErrors
+from contourslam.evaluation.relations import JudgedRelations, RelationErrors
 from contourslam.evaluation.timing import timing
 from contourslam.evaluation.trajectory import absolute_error, relative_error
 from contourslam.slam.result import RunResult
@@ -58,8 +62,7 @@ def run_metrics(
     result: RunResult,
     *,
     aligned: bool = False,
-    relations: RelationErrors | None = None,
-    odometry_relations: RelationErrors | None = None,
+    relations: JudgedRelations | None = None,
     bound: CramerRaoBound | None = None,
     detection: DetectionScore | None = None,
 ) -> Metrics:
@@ -71,8 +74,7 @@ def run_metrics(
     aligned : bool
         Take the errors against truth after moving estimate and odometry so that their first pose is the true one: for
         recordings whose truth is given in another frame.
-    relations, odometry_relations : RelationErrors, optional
-        Of the estimate and of raw odometry.
+    relations : JudgedRelations, optional
     bound : CramerRaoBound, optional
     detection : DetectionScore, optional
 
@@ -86,6 +88,7 @@ def run_metrics(
     nis = _optional(lambda: average_nis(result.nis, result.nis_dof))
     metrics: Metrics = {
         "detector": result.detector,
+        "back_end": result.back_end,
         "scans": len(result.stamps),
         "complete": result.complete,
         "skipped": dict(result.skipped),
@@ -102,13 +105,16 @@ def run_metrics(
             "walls": _mean(result.wall_count),
             "matched": _mean(result.matched_count),
         },
+        "loops": len(result.loops),
+        "quality": None if result.quality is None else _mean(result.quality),
         "seconds": times.seconds,
         "scans_per_second": times.scans_per_second,
     }
     if relations is not None:
-        metrics["relations"] = _relations(relations)
-    if odometry_relations is not None:
-        metrics["odometry_relations"] = _relations(odometry_relations)
+        metrics["relations"] = _relations(relations.estimate)
+        if relations.online is not None:
+            metrics["online_relations"] = _relations(relations.online)
+        metrics["odometry_relations"] = _relations(relations.odometry)
     if bound is not None:
         metrics["cramer_rao"] = {"scan": _coordinates(bound.scan_rms), "filtered": _coordinates(bound.filtered_rms)}
     if detection is not None:

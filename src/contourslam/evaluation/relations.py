@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.poses import between, compose
+from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]
 
@@ -54,6 +55,69 @@ class RelationErrors:
     def rotation_summary(self) -> Distribution:
         """Of the rotational errors, rad."""
         return _distribution(self.rotation)
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedRelations:
+    """One set of known relative poses against all that a run has to show.
+
+    Attributes
+    ----------
+    stamps : ndarray, shape (n, 2)
+        The two times of each relation, s.
+    estimate : RelationErrors
+        Of the run's trajectory, refined where it was.
+    online : RelationErrors or None
+        Of the poses as they were known at the time of each scan; None where the trajectory is that already.
+    odometry : RelationErrors
+        Of raw odometry.
+    """
+
+    stamps: Floats
+    estimate: RelationErrors
+    online: RelationErrors | None
+    odometry: RelationErrors
+
+
+def judge(
+    result: RunResult,
+    relation_stamps: Floats,
+    relation_poses: Floats,
+    odometry_stamps: Floats | None = None,
+    odometry_poses: Floats | None = None,
+) -> JudgedRelations:
+    """Hold a run's trajectory, its online poses and raw odometry against known relative poses.
+
+    Parameters
+    ----------
+    result : RunResult
+    relation_stamps, relation_poses
+        As :func:`relation_errors`.
+    odometry_stamps, odometry_poses
+        As :func:`relation_errors`; where left out, the run's own odometry at its scans.
+
+    Returns
+    -------
+    JudgedRelations
+
+    Raises
+    ------
+    ValueError
+        As :func:`relation_errors`.
+    """
+    wheels = (result.stamps, result.odometry)
+    if odometry_stamps is not None and odometry_poses is not None and len(odometry_stamps) > 1:
+        wheels = (odometry_stamps, odometry_poses)
+    asked = (relation_stamps, relation_poses)
+    online = (
+        None if result.online_poses is None else relation_errors(result.stamps, result.online_poses, *asked, *wheels)
+    )
+    return JudgedRelations(
+        relation_stamps,
+        relation_errors(result.stamps, result.poses, *asked, *wheels),
+        online,
+        relation_errors(*wheels, *asked),
+    )
 
 
 def relation_errors(
