@@ -11,7 +11,8 @@ from contourslam.evaluation.relations import JudgedRelations, RelationErrors
 from contourslam.geometry.poses import compose
 
 KEYS = {
-    "detector", "back_end", "loops", "quality", "scans", "complete", "skipped", "rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside",
+    "back_end", "loops", "quality",
+    "detector", "scans", "complete", "skipped", "rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside",
     "inside_two_sigma", "nis", "nis_inside", "fnr", "fnr_median", "fnr_walls", "fnr_walls_median", "landmarks",
     "per_scan", "seconds", "scans_per_second",
 }  # fmt: skip
