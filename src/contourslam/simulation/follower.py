@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 _SPACING = 0.01  # m
 _WINDOW = 100  # points of the route ahead among which the robot is looked for
-_ACCELERATION, _TURN_ACCELERATION = 0.5, 3.0  # m/s², rad/s²
+ACCELERATION, TURN_ACCELERATION = 0.5, 3.0  # m/s², rad/s²
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,10 @@ class Habits:
     """rad/s."""
     look_ahead: float = 0.4
     """m."""
+
+    def cruise(self, time: float) -> float:
+        """Speed wanted on a straight at a time (s), m/s."""
+        return self.speed * (1.0 + self.swing * math.sin(2 * math.pi * time / self.period + self.phase))
 
 
 def sample_route(waypoints: tuple[tuple[float, float], ...]) -> Floats:
@@ -60,19 +64,29 @@ class Follower:
     def steer(self, pose: tuple[float, float, float], time: float, dt: float) -> tuple[float, float]:
         """Forward speed (m/s) and turning speed (rad/s) wanted at a true pose (x, y, heading) and a time (s)."""
         habits, count = self._habits, len(self._route)
-        x, y, heading = pose
+        x, y, _ = pose
         ahead = self._route[(self._index + np.arange(_WINDOW)) % count]
         self._index += int(np.argmin((ahead[:, 0] - x) ** 2 + (ahead[:, 1] - y) ** 2))
         target = self._route[(self._index + round(habits.look_ahead / self._spacing)) % count]
-        dx, dy = float(target[0]) - x, float(target[1]) - y
-        bearing = (math.atan2(dy, dx) - heading + math.pi) % (2 * math.pi) - math.pi
-        curvature = 2.0 * math.sin(bearing) / max(math.hypot(dx, dy), 0.1)
-        cruise = habits.speed * (1.0 + habits.swing * math.sin(2 * math.pi * time / habits.period + habits.phase))
-        if abs(bearing) > math.pi / 2:  # the route goes on behind: turn on the spot
-            v, omega = 0.0, math.copysign(habits.turn_limit, bearing)
-        else:
-            v = min(cruise, habits.turn_limit / max(abs(curvature), 1e-6))
-            omega = v * curvature
-        self._v += min(max(v - self._v, -_ACCELERATION * dt), _ACCELERATION * dt)
-        self._omega += min(max(omega - self._omega, -_TURN_ACCELERATION * dt), _TURN_ACCELERATION * dt)
+        cruise = habits.cruise(time)
+        v, omega = wanted_twist(pose, (float(target[0]), float(target[1])), cruise, habits.turn_limit)
+        self._v, self._omega = gently(self._v, v, ACCELERATION * dt), gently(self._omega, omega, TURN_ACCELERATION * dt)
         return self._v, self._omega
+
+
+def wanted_twist(
+    pose: tuple[float, float, float], target: tuple[float, float], cruise: float, turn_limit: float
+) -> tuple[float, float]:
+    """Forward (m/s) and turning speed (rad/s) along the circle from a pose (x, y, heading) through a target (m)."""
+    dx, dy = target[0] - pose[0], target[1] - pose[1]
+    bearing = (math.atan2(dy, dx) - pose[2] + math.pi) % (2 * math.pi) - math.pi
+    if abs(bearing) > math.pi / 2:  # the route goes on behind: turn on the spot
+        return 0.0, math.copysign(turn_limit, bearing)
+    curvature = 2.0 * math.sin(bearing) / max(math.hypot(dx, dy), 0.1)
+    v = min(cruise, turn_limit / max(abs(curvature), 1e-6))
+    return v, v * curvature
+
+
+def gently(now: float, wanted: float, most: float) -> float:
+    """Go from one value towards another, by no more than `most`."""
+    return now + min(max(wanted - now, -most), most)

@@ -1,5 +1,6 @@
 """The simulated lidar: every beam is cast from where the lidar is at that beam's own time."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,27 +69,46 @@ def cast_scans(
     model = compile_world(room)  # without the robot: the lidar stands above it and never sees it
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    chance, end, first, wobble = stream(seed, TURN_RATE), drive.times[-1], 0, 0.0
+    end = drive.times[-1]
     scans: list[IdealScan] = []
+    for stamp, offsets, angles in turns(lidar, seed):
+        if stamp + offsets[-1] > end:
+            break
+        origins, directions = _beams(drive, lidar, stamp + offsets, angles)
+        ranges, incidences = _cast(mujoco, model, data, origins, directions)
+        scans.append(IdealScan(stamp, angles, offsets, ranges, incidences))
+        if progress is not None:
+            progress(min(stamp / end, 1.0))
+    return tuple(scans)
+
+
+def turns(lidar: LidarModel, seed: int) -> Iterator[tuple[float, Floats, Floats]]:
+    """Turn the lidar without end.
+
+    Parameters
+    ----------
+    lidar : LidarModel
+    seed : int
+        Varies the turn rate, where it wobbles.
+
+    Yields
+    ------
+    stamp : float
+        Time of the first beam of a turn, s.
+    offsets, angles : ndarray, shape (n,)
+        As of :class:`IdealScan`.
+    """
+    chance, first, wobble = stream(seed, TURN_RATE), 0, 0.0
     while True:
         wobble = 0.9 * wobble + np.sqrt(1 - 0.9**2) * lidar.turn_rate_wobble * chance.standard_normal()
         rate = lidar.turn_rate + wobble
         if lidar.turn_rate_wobble > 0:
             rate = float(np.clip(rate, *lidar.turn_rate_limits))
         beams = round(lidar.samples_per_second / rate)
-        stamp = round(first / lidar.samples_per_second, 9)
-        offsets = np.arange(beams) / lidar.samples_per_second
-        if stamp + offsets[-1] > end:
-            return tuple(scans)
         angles = -np.pi + 2 * np.pi / beams * np.arange(beams)
-        if lidar.clockwise:
-            angles = -angles
-        origins, directions = _beams(drive, lidar, stamp + offsets, angles)
-        ranges, incidences = _cast(mujoco, model, data, origins, directions)
-        scans.append(IdealScan(stamp, angles, offsets, ranges, incidences))
+        offsets = np.arange(beams) / lidar.samples_per_second
+        yield round(first / lidar.samples_per_second, 9), offsets, -angles if lidar.clockwise else angles
         first += beams
-        if progress is not None:
-            progress(min(stamp / end, 1.0))
 
 
 def _beams(drive: Drive, lidar: LidarModel, times: Floats, angles: Floats) -> tuple[Floats, Floats]:

@@ -54,7 +54,7 @@ class Box:
         """Return its four vertices in the world frame, shape (4, 2), m, counter-clockwise."""
         half = 0.5 * np.array([self.length, self.width])
         local = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        return np.array([_place(self.x, self.y, self.yaw_deg, px, py) for px, py in local])
+        return np.array([place(self.x, self.y, self.yaw_deg, px, py) for px, py in local])
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Cylinder:
 Piece = Box | Cylinder
 
 
-def _place(x: float, y: float, yaw_deg: float, px: float, py: float) -> tuple[float, float]:
+def place(x: float, y: float, yaw_deg: float, px: float, py: float) -> tuple[float, float]:
     """World position of the point (px, py) of a thing that stands at (x, y), turned by yaw."""
     # Right angles exactly: a cupboard along a wall must touch it, not miss it by a rounding error.
     quarter, rest = divmod(yaw_deg, 90.0)
@@ -89,7 +89,7 @@ def _place(x: float, y: float, yaw_deg: float, px: float, py: float) -> tuple[fl
 def _part(at: tuple[float, float, float], px: float, py: float, *size: float, bottom: float, colour: Colour) -> Box:
     """Build a box of a thing that stands at x, y, yaw (m, m, degrees)."""
     length, width, top = size
-    x, y = _place(*at, px, py)
+    x, y = place(*at, px, py)
     return Box(x, y, length, width, top, at[2], bottom, colour)
 
 
@@ -195,7 +195,7 @@ def door(hinge: tuple[float, float], yaw_deg: float, width: float = 0.9) -> Box:
 def desk(x: float, y: float, yaw_deg: float = 0.0) -> tuple[Box, ...]:
     """Return a desk 1.5 m long with drawers under its right end, a screen on it and a chair before it."""
     at = (x, y, yaw_deg)
-    chair_x, chair_y = _place(*at, -0.2, -0.55)
+    chair_x, chair_y = place(*at, -0.2, -0.55)
     return (
         *table(x, y, 1.5, 0.75, yaw_deg, colour=PINE),
         _part(at, 0.50, 0, 0.42, 0.60, 0.60, bottom=0.0, colour=GREY),

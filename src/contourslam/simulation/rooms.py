@@ -1,5 +1,6 @@
 """The rooms that come with the package; one more is one more description."""
 
+from contourslam.simulation.buildings import office_building
 from contourslam.simulation.pieces import (
     CARTON,
     DARK_WOOD,
@@ -154,4 +155,6 @@ LARGE_HALL = Room(
     wall_height=5.0,
 )
 
-ROOMS: dict[str, Room] = {room.name: room for room in (FURNISHED_ROOM, OFFICE_CORRIDOR, LARGE_HALL)}
+OFFICE_BUILDING = office_building(corridors=2, seed=4).room  # `long_drive` has larger ones
+
+ROOMS: dict[str, Room] = {room.name: room for room in (FURNISHED_ROOM, OFFICE_CORRIDOR, LARGE_HALL, OFFICE_BUILDING)}
