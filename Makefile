@@ -32,7 +32,7 @@ bench: $(VENV)/.dev ## Measure speed, size and accuracy on real logs; rewrite th
 	$(BIN)/python benchmarks/run_all.py
 
 clean: ## Remove everything that the other targets made, .venv included.
-	rm -rf $(VENV) demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find src tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

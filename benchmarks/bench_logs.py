@@ -1,70 +1,67 @@
-"""Relation error of the filter on real logs, for each detector, corners only and with walls, beside raw odometry.
+"""Real logs: raw odometry, this package and others that pip installs; accuracy, time, memory and size of the map.
 
-Logs are looked for in ../shared/data, or in the folder that the variable LOGS names; each folder in it that holds a log
-(*.log.xz, *.clf.xz) and *.relations.xz is measured, a log without relations is only replayed.
+Each system runs in a process of its own, with one setting for all logs; see systems.py, peers/ and, for where logs are
+looked for, logs.py.
 """
 
-import os
 import sys
-import time
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from contourslam.config import Config
-from contourslam.detectors import DETECTORS
-from contourslam.evaluation.relations import relation_errors
-from contourslam.recordings import open_recording, read_relations
-from contourslam.scan import Odometry
-from contourslam.slam import replay
+from contourslam.recordings import read_trajectory
+from logs import Log, Track, find_logs
+from measure import SystemFailedError
+from systems import Cost, systems
 from table import ROOT, Table, publish
 
+COSTS = ["CPU, s", "of it mapping, s", "memory, MB", "map, kB"]
+ONLINE = "trajectory_online.tum"
 
-def rows_of(folder: Path) -> list[list[object]]:
-    """Replay one folder's log through every detector."""
-    log = next(path for pattern in ("*.log*", "*.clf*") for path in folder.glob(pattern))
-    recording = open_recording(log)
-    messages = list(recording.messages())
-    wheels = [message for message in messages if isinstance(message, Odometry)]
-    odometry = np.array([o.stamp for o in wheels]), np.array([o.pose for o in wheels])
-    relations = next((read_relations(path) for path in folder.glob("*.relations*")), None)
-    raw = relation_errors(*odometry, *relations).translation_summary.mean if relations else None
-    rows: list[list[object]] = []
-    for name in DETECTORS:
-        for walls in (False, True):
-            config = Config(detector=name)
-            config = replace(config, slam=replace(config.slam, walls=walls))
-            start = time.perf_counter()
-            result = replay(messages, config, lidar_mount=recording.lidar_mount)
-            elapsed = time.perf_counter() - start
-            error = relation_errors(result.stamps, result.poses, *relations, *odometry) if relations else None
-            summary = error and error.translation_summary
-            rows.append(
-                [
-                    folder.name,
-                    name,
-                    "with walls" if walls else "corners only",
-                    summary.mean if summary else "-",
-                    summary.median if summary else "-",
-                    raw if raw is not None else "-",
-                    "yes" if result.complete else "NO",
-                    len(result.stamps) / elapsed,
-                ]
-            )
-            print(*rows[-1], file=sys.stderr)
+
+def rows_of(log: Log) -> list[list[object]]:
+    """Run everything over one log."""
+    rows = [[log.name, "raw odometry", *_accuracy(log, log.odometry), *["-"] * len(COSTS)]]
+    for name, system in systems().items():
+        folder = ROOT / "out" / "logs" / log.name / name.replace(", ", "_")
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            cost = system(log, folder)
+        except SystemFailedError as error:
+            rows.append([log.name, name, str(error), *["-"] * (len(rows[0]) - 3)])
+            continue
+        rows.append([log.name, name, *_accuracy(log, read_trajectory(folder / "trajectory.tum")), *_costs(cost)])
+        if (folder / ONLINE).exists():
+            online = _accuracy(log, read_trajectory(folder / ONLINE))
+            rows.append([log.name, f"{name}, as known at the time", *online, *["″"] * len(COSTS)])
+        print(*rows[-1], file=sys.stderr)
     return rows
 
 
+def _accuracy(log: Log, track: Track) -> list[object]:
+    """Give the columns of the table that the log belongs into."""
+    errors, distance = log.relation_errors(track), log.distance(track)
+    if errors is not None:
+        moved = errors.translation_summary
+        return [moved.mean, moved.median, float(np.degrees(errors.rotation_summary.mean))]
+    return [distance.rmse, distance.max] if distance is not None else []
+
+
+def _costs(cost: Cost) -> list[object]:
+    size = "-" if cost.map_bytes is None else cost.map_bytes / 1e3
+    return [cost.cpu_seconds, cost.mapping_seconds, cost.peak_bytes / 1e6, size]
+
+
 def main() -> None:
-    logs = Path(os.environ.get("LOGS", ROOT.parent / "shared" / "data"))
-    folders = sorted({path.parent for pattern in ("*/*.log*", "*/*.clf*") for path in logs.glob(pattern)})
-    if not folders:
-        print(f"no logs in {logs}; name a folder of logs with LOGS=FOLDER")
-        return
-    rows = [row for folder in folders for row in rows_of(folder)]
-    columns = ["log", "detector", "landmarks", "mean, m", "median, m", "raw odometry, m", "finished", "scans/s"]
-    publish(Table("logs", columns, rows))
+    logs = find_logs()
+    verified = [log for log in logs if log.relations]
+    rough = [log for log in logs if log.reference and not log.relations]
+    for name, chosen, columns in (
+        ("logs", verified, ["mean, m", "median, m", "mean rotation, °"]),
+        ("logs_rough", rough, ["RMS distance, m", "largest, m"]),
+    ):
+        rows = [row for log in chosen for row in rows_of(log)]
+        if rows:
+            publish(Table(name, ["log", "system", *columns, *COSTS], rows))
 
 
 if __name__ == "__main__":
