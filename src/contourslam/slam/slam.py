@@ -7,7 +7,7 @@ import numpy as np
 from contourslam.config import Config
 from contourslam.contour.contours import Floats, Ints
 from contourslam.detectors import Detector, make_detector
-from contourslam.geometry.poses import between_one, compose_one
+from contourslam.geometry.poses import compose_one
 from contourslam.landmarks import find_landmarks, trace
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam import ekf
@@ -16,17 +16,16 @@ from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twins
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import predict_measurements
-from contourslam.slam.motion import motion_noise, predict
+from contourslam.slam.motion import predict
 from contourslam.slam.observation import Observations, observe, to_world
-from contourslam.slam.odometry_buffer import OdometryBuffer
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import expected_in_scan
+from contourslam.slam.wheels import Wheels
 
 # Doubt that a slip of the wheels adds to the pose: half a metre, ten degrees. At least three pairs must then agree,
 # twice as many numbers as a pose has.
 SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
 SLIP_PAIRS = 3
-SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
 
 
 def _no_lap(stage: str) -> None:
@@ -77,16 +76,14 @@ class ContourSlam:
         self.mount: Floats = np.array(mount, dtype=np.float64)
         self.filter = LandmarkFilter(np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64))
         self.start_pose = self.filter.pose
-        self._odometry = OdometryBuffer()
-        self._odometry_at_state: Floats | None = None
+        self._wheels = Wheels(config.slam)
         self._linearised_at = self.filter.pose
-        self._stamp, self._twist = -np.inf, np.zeros(3)
         self._nursery = Nursery()
         self._lap = lap
 
     def push_odometry(self, odometry: Odometry) -> None:
         """Take in one odometry reading."""
-        self._odometry.push(odometry)
+        self._wheels.push(odometry)
 
     def push_scan(self, scan: LaserScan) -> ScanUpdate:
         """One step of the filter, to the stamp of the scan.
@@ -100,7 +97,7 @@ class ContourSlam:
         -------
         ScanUpdate
         """
-        motion = self._motion_during(scan)
+        motion = self._wheels.during(scan)
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
@@ -128,7 +125,7 @@ class ContourSlam:
     @property
     def odometry_pose(self) -> Floats:
         """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
-        return np.zeros(3) if self._odometry_at_state is None else self._odometry_at_state
+        return self._wheels.pose
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
@@ -138,26 +135,14 @@ class ContourSlam:
         """Walls of the map as they stand now."""
         return self.filter.wall_map()
 
-    def _motion_during(self, scan: LaserScan) -> tuple[Floats, Floats]:
-        start = scan.stamp - self.config.slam.odometry_lag
-        duration = float(scan.offsets.max()) if scan.offsets.size else 0.0
-        return self._odometry.during(start, start + duration)
-
     def _predict(self, stamp: float, motion: tuple[Floats, Floats]) -> None:
         """Move the pose along the odometry to the scan's stamp (eqs 23-24, 28)."""
-        if len(motion[0]) == 0:
+        step = self._wheels.step(stamp, motion)
+        if step is None:
             return
-        now = self._odometry.pose_at_start(*motion)
-        before = now if self._odometry_at_state is None else self._odometry_at_state
-        self._odometry_at_state = now
-        increment = between_one(before, now)
-        elapsed = stamp - self._stamp
-        twist = increment / max(elapsed, SHORTEST) if 0.0 < elapsed < np.inf else self._twist
-        noise = motion_noise(increment, self.config.slam.motion, twist - self._twist)
-        self._stamp, self._twist = stamp, twist
         f = self.filter
         start = self._linearised_at if self.config.slam.first_estimates else f.pose
-        predict(f.mean, f.covariance, f.size, increment, noise, start)
+        predict(f.mean, f.covariance, f.size, *step, start)
         self._linearised_at = f.pose
 
     def _expect(self) -> Model:

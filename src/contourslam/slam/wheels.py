@@ -1,0 +1,97 @@
+"""The wheels' word between two scans; without wheels, that the robot goes on as it did."""
+
+import math
+
+import numpy as np
+
+from contourslam.config import SlamConfig
+from contourslam.contour.contours import Floats
+from contourslam.geometry.poses import between_one
+from contourslam.scan import LaserScan, Odometry
+from contourslam.slam.motion import motion_noise
+from contourslam.slam.odometry_buffer import OdometryBuffer
+
+SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
+LONGEST = 1.0  # nor do they count as farther apart than this (s) where motion is guessed: nobody goes straight on for long
+STALE = 0.5  # readings that end this long before the scan (s) say nothing about it
+# Without wheels, standard deviations of the velocity that a robot has beside that of the last step: m/s, m/s, rad/s.
+CRUISE = np.array([0.2, 0.2, 0.5])
+
+
+class Wheels:
+    """Odometry readings, asked for the motion up to a scan and during it; changed in place.
+
+    Parameters
+    ----------
+    config : SlamConfig
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self._config = config
+        self._readings = OdometryBuffer()
+        self._at_scan: Floats | None = None
+        self._stamp, self._twist = -math.inf, np.zeros(3)
+
+    def push(self, odometry: Odometry) -> None:
+        """Take in one reading."""
+        self._readings.push(odometry)
+
+    @property
+    def pose(self) -> Floats:
+        """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
+        return np.zeros(3) if self._at_scan is None else self._at_scan
+
+    def during(self, scan: LaserScan) -> tuple[Floats, Floats]:
+        """Readings around a scan: times after its stamp, s, and poses of the base in the odometry's frame."""
+        start = scan.stamp - self._config.odometry_lag
+        duration = float(scan.offsets.max()) if scan.offsets.size else 0.0
+        return self._readings.during(start, start + duration)
+
+    def step(self, stamp: float, motion: tuple[Floats, Floats]) -> tuple[Floats, Floats] | None:
+        """Motion since the last scan and its covariance, in the frame of the base then; None where nothing is known.
+
+        Parameters
+        ----------
+        stamp : float
+            Of the scan, s.
+        motion : (ndarray, ndarray)
+            What :meth:`during` gave for it.
+        """
+        if len(motion[0]) == 0:
+            self._stamp = stamp
+            return None
+        now = self._readings.pose_at_start(*motion)
+        before = now if self._at_scan is None else self._at_scan
+        self._at_scan = now
+        increment = between_one(before, now)
+        elapsed = stamp - self._stamp
+        twist = increment / max(elapsed, SHORTEST) if 0.0 < elapsed < math.inf else self._twist
+        noise = motion_noise(increment, self._config.motion, twist - self._twist)
+        self._stamp, self._twist = stamp, twist
+        return increment, noise
+
+    def step_or_guess(
+        self, stamp: float, motion: tuple[Floats, Floats], last_step: Floats, last_elapsed: float
+    ) -> tuple[Floats, Floats]:
+        """Motion since the last scan: the wheels', or where they are silent, that of the last step once more.
+
+        Parameters
+        ----------
+        stamp : float
+            Of the scan, s.
+        motion : (ndarray, ndarray)
+            What :meth:`during` gave for it.
+        last_step : ndarray, shape (3,)
+            Motion between the two scans before, in the frame of the base at the first of them.
+        last_elapsed : float
+            Time between them, s.
+        """
+        elapsed = stamp - self._stamp
+        known = self.step(stamp, motion)
+        if known is not None and (motion[0][-1] > -STALE or elapsed > LONGEST):
+            return known
+        if not 0.0 < elapsed < math.inf:
+            return np.zeros(3), np.diag((CRUISE * SHORTEST) ** 2)
+        ahead = min(elapsed, LONGEST)
+        step = last_step * (ahead / max(last_elapsed, SHORTEST)) if last_elapsed > 0.0 else np.zeros(3)
+        return step, np.diag((CRUISE * max(ahead, SHORTEST)) ** 2)
