@@ -17,6 +17,7 @@ from contourslam.report.result_folder import read_result_folder
 Failure = Callable[..., str]
 FILES = {
     "trajectory.tum",
+    "index.html",
     "map.geojson",
     "map.pgm",
     "map.yaml",
@@ -46,6 +47,15 @@ sys.exit(main(sys.argv[2:]))
 def test_a_run_leaves_every_promised_file(mapped: Path) -> None:
     assert {path.name for path in mapped.iterdir()} == FILES
     assert "contourslam run" in (mapped / "config.yaml").read_text()
+
+
+def test_the_page_of_a_run_says_what_was_mapped(mapped: Path) -> None:
+    page = (mapped / "index.html").read_text()
+    metrics = json.loads((mapped / "metrics.json").read_text())
+    assert f"{metrics['landmarks']['corners']} corners and {metrics['landmarks']['walls']} walls" in page
+    assert "<h1>circle.log</h1>" in page
+    for absent in ("known relative poses", "true poses", "Closed loops", "INCOMPLETE"):
+        assert absent not in page
 
 
 def test_the_map_of_a_known_room_is_right(mapped: Path) -> None:
@@ -165,14 +175,15 @@ def test_a_full_disk_is_a_known_failure(
     assert "No space left on device" in said
 
 
-def test_without_the_report_extra_all_but_the_picture_is_written(
+def test_without_the_report_extra_all_but_the_picture_and_the_page_is_written(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in [name for name in sys.modules if name.startswith("contourslam.report.figures")]:
+    drawing = ("contourslam.report.figures", "contourslam.report.page.run")
+    for name in [name for name in sys.modules if name.startswith(drawing)]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["run", str(log), "-o", str(tmp_path), "--max-scans", "3"]) == 0
-    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.png"}
+    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.png", "index.html"}
     assert "contourslam[report]" in capsys.readouterr().err
 
 
@@ -198,6 +209,22 @@ def test_relations_are_judged_beside_raw_odometry(
     assert metrics["relations"]["count"] == 1
     assert metrics["relations"]["translation"]["mean"] < metrics["odometry_relations"]["translation"]["mean"]
     assert json.loads((tmp_path / "out" / "metrics.json").read_text())["relations"] == metrics["relations"]
+    header, row = (tmp_path / "out" / "relation_errors.csv").read_text().splitlines()
+    assert header == "earlier_stamp,later_stamp,translation,rotation,odometry_translation,odometry_rotation"
+    values = [float(value) for value in row.split(",")]
+    assert values[:2] == [100.0, 110.0]
+    assert values[2] == pytest.approx(metrics["relations"]["translation"]["mean"], rel=1e-4)
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "Error against known relative poses" in page
+    assert "--relations" in page  # the command
+
+
+def test_a_single_scan_is_not_judged_and_still_shown(log: Path, tmp_path: Path) -> None:
+    relations = tmp_path / "truth.relations"
+    relations.write_text("100.0 110.0 1 0 0 0 0 0\n")
+    arguments = ["--max-scans", "1", "--no-grid", "--relations", str(relations)]
+    assert main(["run", str(log), "-o", str(tmp_path / "out"), *arguments]) == 0
+    assert "1 scan over" in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_a_wrong_relations_file_fails_before_any_work(failure: Failure, log: Path, tmp_path: Path) -> None:

@@ -34,8 +34,10 @@ DEFAULTS = Config(slam=SlamConfig(walls=True))
 class Run:
     """Map a recording: trajectory and map of corners and walls, into a folder.
 
-    The recording is a rosbag (1, 2, MCAP) or a CARMEN log, plain, .gz or .xz. The folder gets trajectory.tum,
-    map.geojson, map.pgm and map.yaml for Nav2's map server, map.png, metrics.json, scans.csv and config.yaml.
+    The recording is a rosbag (1, 2, MCAP) or a CARMEN log, plain, .gz or .xz. The folder gets index.html (a page about
+    the run), trajectory.tum, map.geojson, map.pgm and map.yaml for Nav2's map server, map.png, metrics.json, scans.csv
+    and config.yaml, and where the run has them trajectory_online.tum (poses as known at the time, before the
+    refinement), loops.csv (the closed loops with their evidence) and relation_errors.csv.
     Ctrl-C stops and keeps what is done.
 
     Example: contourslam run intel.log.xz --relations intel.relations.xz -o out/intel
@@ -124,6 +126,7 @@ def _run(options: Run, command: str) -> int:
     from contourslam.evaluation.metrics import run_metrics
     from contourslam.recordings import open_recording, read_relations
     from contourslam.report.result_folder import write_result_folder
+    from contourslam.report.run_page import write_run_page
     from contourslam.slam import replay
 
     make_detector(options.settings.detector)  # an unknown name fails before any work is done
@@ -154,6 +157,8 @@ def _run(options: Run, command: str) -> int:
         metrics = run_metrics(result, relations=judged)
         grid = None if options.no_grid else _grid(reading, result, options.settings, recording)
         notes = write_result_folder(options.output, result, options.settings, metrics, grid=grid, command=command)
+        name = options.recording.name
+        notes += write_run_page(options.output, result, options.settings, metrics, judged, command=command, name=name)
         if grid is None:  # an earlier run's would not belong to this one
             for name in ("map.pgm", "map.yaml"):
                 (options.output / name).unlink(missing_ok=True)

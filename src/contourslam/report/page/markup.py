@@ -36,7 +36,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture file beside the page, with the words for those who cannot see it."""
+    """A picture, with the words for those who cannot see it: a file beside the page, or the page's own (``data:``)."""
 
     source: str
     width: int
@@ -83,14 +83,16 @@ def _cell(cell: Cell) -> str:
 
 
 def figure(picture: Picture) -> str:
-    """Give a figure that opens in full size when clicked."""
+    """Give a figure; a file opens in full size when clicked."""
     kind = "chart" if picture.chart else "photo"
     source = escape(picture.source)
-    return (
-        f'<figure><a href="{source}"><img class="{kind}" src="{source}" width="{picture.width}" '
-        f'height="{picture.height}" alt="{escape(picture.alt)}"></a>'
-        f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
+    image = (
+        f'<img class="{kind}" src="{source}" width="{picture.width}" height="{picture.height}" '
+        f'alt="{escape(picture.alt)}">'
     )
+    if not picture.source.startswith("data:"):  # browsers refuse to open these by themselves
+        image = f'<a href="{source}">{image}</a>'
+    return f"<figure>{image}<figcaption>{escape(picture.caption)}</figcaption></figure>"
 
 
 def pair(pictures: Sequence[Picture]) -> str:
@@ -119,7 +121,18 @@ def definitions(terms: dict[str, str]) -> str:
     return f"<dl>{''.join(pairs)}</dl>"
 
 
-def page(title: str, *, lead: str, sections: Sequence[Section], footer: str, banner: str = "") -> str:
+def tiles(figures: Sequence[tuple[str, str, str]]) -> str:
+    """Give the headline figures: value, what it is, and what to hold it against."""
+    body = "".join(
+        f"<li><strong>{escape(value)}</strong> <span>{escape(name)}</span> <small>{escape(beside)}</small></li>"
+        for value, name, beside in figures
+    )
+    return f'<ul class="tiles">{body}</ul>'
+
+
+def page(
+    title: str, *, lead: str, sections: Sequence[Section], footer: str, banner: str = "", summary: str = ""
+) -> str:
     """Give the whole page, its style inside.
 
     Parameters
@@ -130,6 +143,8 @@ def page(title: str, *, lead: str, sections: Sequence[Section], footer: str, ban
     sections : sequence of Section
     banner : str
         A warning above it all.
+    summary : str
+        HTML between the opening words and the contents, such as tiles.
 
     Returns
     -------
@@ -141,7 +156,7 @@ def page(title: str, *, lead: str, sections: Sequence[Section], footer: str, ban
         title=escape(title),
         style=resources.joinpath("style.css").read_text(encoding="utf-8"),
         banner=f'<p class="warning" role="status">{escape(banner)}</p>' if banner else "",
-        lead=paragraph(lead, "lead"),
+        lead=paragraph(lead, "lead") + summary,
         contents="\n".join(f'<li><a href="#{escape(s.anchor)}">{escape(s.title)}</a></li>' for s in sections),
         sections="\n".join(
             f'<section aria-labelledby="{escape(s.anchor)}">\n<h2 id="{escape(s.anchor)}">{escape(s.title)}</h2>\n'
