@@ -28,7 +28,7 @@ from contourslam.matching.constellation_pairs import (
 )
 from contourslam.matching.constellation_votes import VOTERS, vote
 
-FULL_WALL = 2.0  # a wall of this length, m, holds its one direction as well as a corner holds both
+FULL_WALL = 1.0  # a wall of this length, m, holds its one direction as well as a corner holds both
 KEPT = 48  # peaks of the votes that are refined
 MOST_CELLS = 4e6  # of the grid of positions; beyond, the cells grow
 ROUNDS = np.array([3.0, 2.0, 1.0, 1.0])  # gates of the refinement, in tolerances
@@ -87,9 +87,9 @@ class Proposal:
     corner_pairs, wall_pairs : ndarray of int, shape (n, 2) and (m, 2)
         Indices of the local and the known landmark. Several local walls may be parts of one known wall.
     score : float
-        Landmarks that agree, in corners' worth, counting only as much as both directions are held, times the part of
-        the local constellation that was found. The best other proposal's score as a part of the best's tells how
-        ambiguous the place is.
+        Landmarks that agree, a corner counting two and a wall of a metre or more one, as far as both directions are
+        held, times the part of the local constellation that was found. The best other proposal's score as a part of
+        the best's tells how ambiguous the place is.
     residual : float
         Root mean square of the pairs' distances, m.
     """
@@ -164,6 +164,9 @@ def propose(
         )
     if window is not None and guess is None:
         raise ValueError("propose: a window needs a guess around which to lie")
+    for given in (guess, window):
+        if given is not None and (np.shape(given) != (3,) or not np.isfinite(given).all()):
+            raise ValueError(f"propose: guess and window must be three finite numbers, got {given!r}")
     seen, landmarks = _rows(local), _rows(known)
     if len(seen) == 0 or len(landmarks) == 0:
         return ()

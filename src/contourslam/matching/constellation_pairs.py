@@ -46,32 +46,39 @@ def _overlap(mine: Floats, other: Floats, dx: float, dy: float, turn: float) -> 
 
 
 @kernel
-def _miss(mine: Floats, other: Floats, dx: float, dy: float, turn: float) -> float:
-    """How far two landmarks of a kind lie apart, m; walls across them, and inf where they do not overlap."""
+def _miss(mine: Floats, other: Floats, dx: float, dy: float, turn: float) -> tuple[float, float]:
+    """How far two landmarks of a kind lie apart, m, and on how much of `mine`; walls across them, inf if side by side.
+
+    dx, dy and turn lead from `other` to `mine`.
+    """
     if mine[KIND] != WALL:
-        return math.hypot(dx, dy)
+        return math.hypot(dx, dy), 1.0
     first, last, across = _overlap(mine, other, dx, dy, turn)
     if last - first < min(mine[HALF], other[HALF]):  # half of the shorter wall has to lie beside the longer
-        return math.inf
+        return math.inf, 0.0
     slope = math.tan(turn)
-    return math.sqrt(0.5 * ((across + slope * first) ** 2 + (across + slope * last) ** 2))
+    miss = math.sqrt(0.5 * ((across + slope * first) ** 2 + (across + slope * last) ** 2))
+    return miss, (last - first) / max(2.0 * mine[HALF], 1e-9)
 
 
 @kernel
 def pair_nearest(
-    local: Floats, known: Floats, pose: Floats, gate: float, angle_gate: float, pairs: Ints, misses: Floats
-) -> None:
-    """Nearest known landmark of each local one within the gates into `pairs`, else -1; and how far apart they lie.
+    local: Floats, known: Floats, pose: Floats, gate: float, angle_gate: float, pairs: Ints, misses: Floats,
+    shares: Floats,
+) -> None:  # fmt: skip
+    """Nearest known landmark of each local one within the gates into `pairs`, else -1; how far off, on how much of it.
 
-    A known corner goes to one local corner only; several local walls may be parts of one known wall.
+    The corners come first in `known`. A known corner goes to one local corner only; several local walls may be parts of
+    one known wall.
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     owner = np.full(known.shape[0], -1, dtype=np.int64)
     pairs[:], misses[:] = -1, gate
+    walls = known.shape[0] - int((known[:, KIND] == WALL).sum())  # where they begin
     for i in range(local.shape[0]):
         mine = local[i]
         x, y = pose[0] + cos * mine[X] - sin * mine[Y], pose[1] + sin * mine[X] + cos * mine[Y]
-        for j in range(known.shape[0]):
+        for j in range(walls, known.shape[0]) if mine[KIND] == WALL else range(walls):
             other = known[j]
             dx, dy = x - other[X], y - other[Y]
             if dx * dx + dy * dy > (mine[HALF] + other[HALF] + misses[i]) ** 2 or mine[KIND] != other[KIND]:
@@ -81,9 +88,9 @@ def pair_nearest(
             turn = wrap_angle(mine[DIRECTION] + pose[2] - other[DIRECTION])
             if abs(turn) > angle_gate:
                 continue
-            miss = _miss(mine, other, dx, dy, turn)
+            miss, share = _miss(mine, other, dx, dy, turn)
             if miss < misses[i] and (owner[j] < 0 or miss < misses[owner[j]]):
-                pairs[i], misses[i] = j, miss
+                pairs[i], misses[i], shares[i] = j, miss, share
         j = pairs[i]
         if j >= 0 and mine[KIND] != WALL:
             if owner[j] >= 0:
@@ -96,8 +103,7 @@ def solve(local: Floats, known: Floats, pose: Floats, pairs: Ints, sigma: float,
     """One Gauss-Newton step over the pairs from `pose`; a direction that they leave open stays."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     normal = np.diag(np.array([1.0, 1.0, 100.0]))  # a weak prior at the pose itself: a metre, a tenth of a radian
-    gradient = np.zeros(3)
-    row = np.empty(3)
+    gradient, row = np.zeros(3), np.empty(3)
     for i in range(local.shape[0]):
         if pairs[i] < 0:
             continue
@@ -122,8 +128,10 @@ def solve(local: Floats, known: Floats, pose: Floats, pairs: Ints, sigma: float,
                 along = first if half == 0 else last
                 row[2], off, weight = -nx * y + ny * x + along, across + slope * along, 0.5 * mine[WEIGHT]
             row[0], row[1] = nx, ny
-            normal += weight / sigma**2 * np.outer(row, row)
-            gradient += weight / sigma**2 * off * row
+            for a in range(3):
+                gradient[a] += weight / sigma**2 * off * row[a]
+                for b in range(3):
+                    normal[a, b] += weight / sigma**2 * row[a] * row[b]
     step = np.linalg.solve(normal, gradient)
     return np.array([pose[0] - step[0], pose[1] - step[1], wrap_angle(pose[2] - step[2])])
 
@@ -135,11 +143,12 @@ def judge(
     """Refine each pose of `starts` over the pairs that agree, with one gate (m) a round, and judge it by the last.
 
     Returns rows of x, y, heading, score, root mean square miss and number of known landmarks that agree; and the known
-    landmark of each local one, -1 for none. The score is the pairs' :func:`worth`, each the less the farther it is off,
-    times the part of all local landmarks that they are. `slack` (rad) is added to the first round's angle gate.
+    landmark of each local one, -1 for none. The score is the pairs' :func:`worth`, each the less the farther it is off
+    and the less of a wall it covers, times the part of all local landmarks that they are. `slack` (rad) is added to the
+    first round's angle gate.
     """
     found, pairs = np.empty((starts.shape[0], 6)), np.empty((starts.shape[0], local.shape[0]), dtype=np.int64)
-    misses = np.empty(local.shape[0])
+    misses, shares = np.empty(local.shape[0]), np.empty(local.shape[0])
     radius = np.sqrt(local[:, X] ** 2 + local[:, Y] ** 2).max() + 2.0 * gates[0] + local[:, HALF].max() + known[:, HALF]
     total, final = local[:, WEIGHT].sum(), gates[-1]
     for q in range(starts.shape[0]):
@@ -148,7 +157,7 @@ def judge(
         near = known[index]
         for turn in range(gates.size):
             angle_gate = angle_tolerance + (slack if turn == 0 else 0.0)
-            pair_nearest(local, near, pose, gates[turn], angle_gate, pairs[q], misses)
+            pair_nearest(local, near, pose, gates[turn], angle_gate, pairs[q], misses, shares)
             if turn + 1 < gates.size:
                 pose = solve(local, near, pose, pairs[q], 0.5 * final, 0.5 * angle_tolerance)
         xx = xy = yy = agreed = squares = 0.0
@@ -156,7 +165,7 @@ def judge(
         for i in range(local.shape[0]):
             if pairs[q, i] < 0:
                 continue
-            credit = 1.0 - (misses[i] / final) ** 2
+            credit = shares[i] * (1.0 - (misses[i] / final) ** 2)
             of_xx, of_xy, of_yy = information(local[i])
             xx, xy, yy = xx + credit * of_xx, xy + credit * of_xy, yy + credit * of_yy
             agreed += credit * local[i, WEIGHT]

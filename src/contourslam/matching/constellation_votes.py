@@ -122,6 +122,8 @@ def _gather(mask: Masks, weights: Floats, corners: np.uint64, at: Floats, peaks:
         for u in range(mask.shape[1]):
             floor = max(least, HALF_AS_GOOD * best)
             votes = mask[v, u]
+            if votes == 0:
+                continue
             if _count(votes) + _count(votes & corners) <= floor:  # a corner is worth two at most, a wall one
                 continue
             if votes != last:  # neighbours mostly have the same votes
@@ -194,7 +196,7 @@ def vote(
                 continue
             for p in range(starts[c], starts[c + 1]):
                 i, j = mine[p], other[p]
-                if abs(wrap_angle(turns[p] - heading)) > step:
+                if abs(wrap_angle(turns[p] - heading)) > 0.75 * step:  # bins overlap by half a step
                     continue
                 x, y = cos * local[i, X] - sin * local[i, Y], sin * local[i, X] + cos * local[i, Y]
                 tx, ty, half, lever = 1.0, 0.0, 0.0, math.hypot(x, y)
