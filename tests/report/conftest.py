@@ -1,5 +1,9 @@
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +26,67 @@ from contourslam.simulation.rooms import FURNISHED_ROOM
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import Loop, RunResult
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+VOID = {"meta", "link", "img", "br", "hr"}
+
+# A page has no script, so a copy gets one that tells what the browser made of it.
+PROBE = """<script>
+addEventListener("error", e => document.documentElement.dataset.errors = e.message || e.target.src, true);
+addEventListener("load", () => {
+  const root = document.documentElement, images = [...document.images];
+  root.dataset.broken = images.filter(i => !i.complete || !i.naturalWidth).map(i => i.src.slice(0, 200)).join(" ");
+  root.dataset.images = images.length;
+  root.dataset.requests = performance.getEntriesByType("resource").map(r => r.name.slice(0, 200)).join(" ");
+  root.dataset.overflow = document.body.scrollWidth - document.body.clientWidth;
+});</script>"""
+
 ROOM = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
+
+
+class Page(HTMLParser):
+    """Tags in their nesting, and the attributes of each."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags = [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture(scope="session")
+def parsed() -> type[Page]:
+    """Read a page, which must be well nested."""
+    return Page
+
+
+@pytest.fixture
+def browse(tmp_path: Path) -> Callable[..., dict[str, str]]:
+    """Open a page as a file in a real browser; tell what it made of it. Without a browser the test is skipped."""
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine")
+
+    def opened(page: Path, *, width: int) -> dict[str, str]:
+        copy = page.with_name("probe.html")
+        narrow = f"{PROBE}<style>html {{ width: {width}px }}</style>"
+        copy.write_text(page.read_text().replace("<head>", "<head>" + narrow, 1))
+        options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+        command = [CHROMIUM, *options, f"--user-data-dir={tmp_path}", "--virtual-time-budget=5000", "--dump-dom"]
+        done = subprocess.run([*command, copy.as_uri()], capture_output=True, text=True, timeout=60, check=True)
+        copy.unlink()
+        return dict(Page(done.stdout).all("html")[0])
+
+    return opened
 
 
 def square_map(rng: np.random.Generator) -> tuple[CornerMap, WallMap]:
