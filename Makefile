@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench check clean
+.PHONY: help demo test bench bench-scale check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
 
 help: ## List the targets.
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, write the report to demo/ (minutes).
 	$(BIN)/contourslam compare --room furnished_room --seeds 3 --jobs 2 --output demo --overwrite
@@ -30,6 +30,9 @@ check: $(VENV)/.dev ## Lint, check the format and the types.
 
 bench: $(VENV)/.dev ## Measure speed, size and accuracy on real logs; rewrite the tables of BENCHMARK.md.
 	$(BIN)/python benchmarks/run_all.py
+
+bench-scale: $(VENV)/.dev ## Measure time, memory and error against distance in simulated buildings, up to 10 km.
+	$(BIN)/python benchmarks/bench_scale.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
 	rm -rf $(VENV) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

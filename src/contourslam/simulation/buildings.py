@@ -71,7 +71,7 @@ def office_building(corridors: int = 4, seed: int = 0) -> Building:
     pieces: list[Piece] = []
     for c, (x0, x1) in enumerate(columns):
         for r, (y0, y1) in enumerate(rows):
-            block = _Block((x0, x1, y0, y1), _sides(c, r, corridors), plans, chance)
+            block = _Block((x0, x1, y0, y1), _sides(c, r, corridors), closed, plans, chance)
             pieces += block.pieces
             for stretch, doorways in block.doorways.items():
                 stretches[stretch] += doorways
@@ -166,6 +166,7 @@ class _Block:
         self,
         bounds: tuple[float, float, float, float],
         sides: dict[str, Stretch | None],
+        closed: list[Stretch],
         plans: dict[tuple[float, int], Plan],
         chance: np.random.Generator,
     ) -> None:
@@ -188,8 +189,8 @@ class _Block:
             gaps = [(s, _DOOR) for s, _ in doors]
             self.pieces += partition(frame.at(0, _WALL / 2), frame.at(length, _WALL / 2), _STOREY, *gaps)
             if stretch is not None:
-                tries = int(chance.integers(0, 4))
-                self.pieces += frame.put(furnish_wall(length, tuple(s for s, _ in doors), tries, chance))
+                bare = [s for s, _ in doors] + [length / 2] * (stretch in closed)  # a fire door is in the middle
+                self.pieces += frame.put(furnish_wall(length, tuple(bare), int(chance.integers(0, 4)), chance))
         if share == 0.5:
             frame, length, depth = walls[facing[0]]
             self.pieces += partition(frame.at(0, depth / 2), frame.at(length, depth / 2), _STOREY)

@@ -107,7 +107,7 @@ def furnish_wall(length: float, doors: tuple[float, ...], tries: int, chance: np
     length : float
         Of the wall, m; its ends, where corridors cross, stay bare.
     doors : tuple of float
-        Middles of the doors along it, m, which stay free.
+        Middles of the doors along it, m; about a metre on both sides of them stays free.
     tries : int
         How many things are tried.
     chance : numpy.random.Generator
