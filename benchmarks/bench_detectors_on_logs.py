@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from contourslam.config import Config
 from contourslam.detectors import DETECTORS
-from contourslam.slam import replay
+from contourslam.replay import replay
 from logs import Log, find_logs
 from table import Table, publish
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 from contourslam.config import Config
 from contourslam.detectors import DETECTORS
+from contourslam.replay import replay
 from contourslam.scan import TruePose
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import ROOMS
 from contourslam.simulation.simulate import simulate
-from contourslam.slam import replay
 from table import Table, publish
 
 SECONDS, TURNS, TARGET = 120.0, 5, 1500

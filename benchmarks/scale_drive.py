@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.config import Config
+from contourslam.replay import replay
 from contourslam.report.map_files import write_geojson
 from contourslam.scan import LaserScan
 from contourslam.simulation.long_drive import LongDrive, Message, building_drive
-from contourslam.slam import replay
 from contourslam.slam.result import RunResult, ScanUpdate
 
 WARM_UP = 3000  # messages, which compile what has to be compiled

@@ -15,10 +15,10 @@ from contourslam.contour import Contours
 from contourslam.detectors import make_detector
 from contourslam.evaluation.errors import rmse
 from contourslam.experiments.known_room import told
+from contourslam.replay import replay
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import ROOMS
 from contourslam.simulation.simulate import simulate
-from contourslam.slam import replay
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import numpy as np
 from contourslam.config import Config, SlamConfig
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.recordings import open_recording, write_recording
+from contourslam.replay import replay
 from contourslam.report.result_folder import write_result_folder
 from contourslam.report.run_grid import run_grid
-from contourslam.slam import replay
 
 
 def simulated(path: Path) -> Path:

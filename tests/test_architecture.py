@@ -13,10 +13,10 @@ ROOT = PACKAGE.parents[1]
 
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
 GROUND = ("errors", "config", "kernels", "geometry", "scan")
-LINE = ("contour", "detectors", "landmarks", "slam")
+LINE = ("contour", "detectors", "landmarks", "matching", "slam", "graph", "replay")
 ORDER = (*GROUND, *LINE, "recordings", "simulation", "evaluation", "experiments", "report", "cli")
-EXTRAS = {"mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
-MAY_USE_EXTRAS = ("simulation", "evaluation", "experiments", "report")
+EXTRAS = {"gtsam", "mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
+MAY_USE_EXTRAS = ("graph", "simulation", "evaluation", "experiments", "report")
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
@@ -78,7 +78,7 @@ def test_nothing_unpickles_or_evaluates() -> None:
 
 def test_every_room_has_its_place_in_the_order() -> None:
     rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
-    assert rooms == set(ORDER) - {"errors", "config", "kernels"}
+    assert rooms == set(ORDER) - {"errors", "config", "kernels", "replay"}
 
 
 def test_importing_the_package_loads_no_library() -> None:

@@ -9,6 +9,7 @@ from typing import Literal
 
 from contourslam.errors import ConfigError
 
+BackEnd = Literal["ekf", "graph"]
 Association = Literal["nearest", "mahalanobis", "mutual", "joint"]
 
 
@@ -122,6 +123,8 @@ class MotionConfig:
 class SlamConfig:
     """The filter (eqs 23-31), its association, and the life of its landmarks."""
 
+    contour_matching: bool = False
+    """The filter predicts with the motion that contour matching measured; off, with the wheels alone (eq. 28)."""
     walls: bool = False
     """Walls are landmarks too; off, corners only as in the paper's Table I."""
     association: Association = "joint"
@@ -153,8 +156,21 @@ class SlamConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class GraphConfig:
+    """The graph of keyframes, corners and walls."""
+
+    loops: bool = True
+    """Look for places seen before and close loops; off, what is left is contour odometry with landmarks."""
+    refine: bool = True
+    """At the end of a recording, solve the whole graph once more with every scan held against all its neighbours."""
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """The whole pipeline from scan to map."""
+
+    back_end: BackEnd = "ekf"
+    """What binds the scans together: the paper's filter, or the graph, which closes loops (extra `graph`)."""
 
     detector: str = "matched_filter"
     """Landmark detector, a key of ``contourslam.detectors.DETECTORS``."""
@@ -164,3 +180,4 @@ class Config:
     contour: ContourConfig = field(default_factory=ContourConfig)
     landmarks: LandmarkConfig = field(default_factory=LandmarkConfig)
     slam: SlamConfig = field(default_factory=SlamConfig)
+    graph: GraphConfig = field(default_factory=GraphConfig)

@@ -10,8 +10,8 @@ import pytest
 from contourslam.config import Config, SlamConfig
 from contourslam.detectors import DETECTORS
 from contourslam.recordings import open_recording
+from contourslam.replay import replay
 from contourslam.scan import LaserScan, Odometry, TruePose
-from contourslam.slam import replay
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 LOGS = {

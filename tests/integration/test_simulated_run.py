@@ -12,10 +12,11 @@ pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 from contourslam.config import Config, SlamConfig
 from contourslam.detectors import DETECTORS
 from contourslam.geometry.angles import wrap
+from contourslam.replay import replay
 from contourslam.simulation.config import YDLIDAR_X4, SimulationConfig
 from contourslam.simulation.rooms import ROOMS
 from contourslam.simulation.simulate import SimulatedRun, simulate
-from contourslam.slam import RunResult, replay
+from contourslam.slam import RunResult
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import RecordingError
 from contourslam.geometry.poses import between, compose
+from contourslam.replay import replay
 from contourslam.scan import LaserScan, Odometry, TruePose
-from contourslam.slam import ContourSlam, RunResult, ScanUpdate, replay
+from contourslam.slam import ContourSlam, RunResult, ScanUpdate
 
 Floats = NDArray[np.float64]
 Message = LaserScan | Odometry | TruePose

@@ -125,9 +125,9 @@ def _run(options: Run, command: str) -> int:
     from contourslam.detectors import make_detector
     from contourslam.evaluation.metrics import run_metrics
     from contourslam.recordings import open_recording, read_relations
+    from contourslam.replay import replay
     from contourslam.report.result_folder import write_result_folder
     from contourslam.report.run_page import write_run_page
-    from contourslam.slam import replay
 
     make_detector(options.settings.detector)  # an unknown name fails before any work is done
     relations = None if options.relations is None else read_relations(options.relations)

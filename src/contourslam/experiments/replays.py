@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from contourslam.config import Config
 from contourslam.experiments.parallel import Step
 from contourslam.recordings.recording import Message
+from contourslam.replay import replay
 from contourslam.scan import LaserScan
-from contourslam.slam import replay
 from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]

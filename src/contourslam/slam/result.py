@@ -30,6 +30,8 @@ class ScanUpdate:
         Normalised innovation squared of the whole correction; 0 where nothing matched.
     nis_dof : int
         Its degrees of freedom.
+    quality : float or None
+        How well the scan's contours fitted the local map, in [0, 1]; None without contour matching.
     """
 
     stamp: float
@@ -43,6 +45,7 @@ class ScanUpdate:
     dropped: tuple[int, ...]
     nis: float
     nis_dof: int
+    quality: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,8 @@ class Loop:
     shift : ndarray, shape (3,)
         By how much the estimate before the loop was off, in the frame of the later base: m, m, rad.
     method : str
-        What proposed it: "search" (contours, inside the pose's uncertainty) or "constellation" (corners and walls).
+        What proposed it: "nearby" (the pose was sure enough), "search" (contours, inside the pose's uncertainty) or
+        "constellation" (corners and walls).
     pairs : int
         Contour points, or landmarks, that were paired.
     residual : float

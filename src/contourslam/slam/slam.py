@@ -127,6 +127,9 @@ class ContourSlam:
         """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
         return self._wheels.pose
 
+    def finish(self) -> None:
+        """Nothing is revised: a filter's poses stay what they were at the time."""
+
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
         return self.filter.corner_map()

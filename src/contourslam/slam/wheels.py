@@ -12,7 +12,7 @@ from contourslam.slam.motion import motion_noise
 from contourslam.slam.odometry_buffer import OdometryBuffer
 
 SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
-LONGEST = 1.0  # nor do they count as farther apart than this (s) where motion is guessed: nobody goes straight on for long
+LONGEST = 1.0  # nor do they count as farther apart than this (s) where motion is guessed: nobody goes on for long
 STALE = 0.5  # readings that end this long before the scan (s) say nothing about it
 # Without wheels, standard deviations of the velocity that a robot has beside that of the last step: m/s, m/s, rad/s.
 CRUISE = np.array([0.2, 0.2, 0.5])

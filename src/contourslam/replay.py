@@ -12,6 +12,7 @@ from contourslam.detectors import Detector
 from contourslam.errors import RecordingError
 from contourslam.geometry.poses import between, compose, interpolate
 from contourslam.scan import LaserScan, Odometry, TruePose
+from contourslam.slam.mapper import Mapper
 from contourslam.slam.result import RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
@@ -35,6 +36,30 @@ class Stopwatch:
         now = thread_time()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
         self._last = now
+
+
+def make_mapper(
+    config: Config,
+    detector: Detector | None = None,
+    *,
+    initial_pose: Floats | None = None,
+    lidar_mount: Floats | None = None,
+    lap: Callable[[str], None] = lambda stage: None,
+) -> Mapper:
+    """Make the back end that the configuration names; the arguments are those of :class:`ContourSlam`.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration names a detector that does not exist.
+    MissingExtraError
+        If it names the graph and GTSAM is not installed.
+    """
+    if config.back_end == "graph":
+        from contourslam.graph import GraphSlam
+
+        return GraphSlam(config, detector, initial_pose=initial_pose, lidar_mount=lidar_mount, lap=lap)
+    return ContourSlam(config, detector, initial_pose=initial_pose, lidar_mount=lidar_mount, lap=lap)
 
 
 def replay(
@@ -76,7 +101,7 @@ def replay(
         If the recording fails before its first scan, or holds none.
     """
     watch = Stopwatch()
-    slam: ContourSlam | None = None
+    slam: Mapper | None = None
     done: list[tuple[ScanUpdate, Floats]] = []  # one list, so that Ctrl-C cannot come between two
     truth: list[TruePose] = []
     skipped: Counter[str] = Counter()
@@ -97,7 +122,7 @@ def replay(
                 start = initial_pose
                 if start is None and truth:
                     start = _pose_at(truth, np.array([message.stamp]))[0]
-                slam = ContourSlam(config, detector, initial_pose=start, lidar_mount=mount, lap=watch)
+                slam = make_mapper(config, detector, initial_pose=start, lidar_mount=mount, lap=watch)
             for reading in waiting:
                 slam.push_odometry(reading)
             waiting.clear()
@@ -119,7 +144,7 @@ def replay(
     if slam is None:
         if complete:
             raise RecordingError("the recording holds no scan")
-        slam = ContourSlam(config, detector, initial_pose=initial_pose, lidar_mount=mount)
+        slam = make_mapper(config, detector, initial_pose=initial_pose, lidar_mount=mount)
     return _result(config, slam, done, truth, watch, dict(skipped), complete)
 
 
@@ -130,7 +155,7 @@ def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
 
 def _result(
     config: Config,
-    slam: ContourSlam,
+    slam: Mapper,
     done: list[tuple[ScanUpdate, Floats]],
     truth: list[TruePose],
     watch: Stopwatch,
@@ -140,17 +165,22 @@ def _result(
     updates = [update for update, _ in done]
     stamps = np.array([u.stamp for u in updates])
     poses = np.array([u.pose for u in updates]).reshape(-1, 3)
+    covariances = np.array([u.covariance for u in updates]).reshape(-1, 3, 3)
     raw = np.array([odometry for _, odometry in done]).reshape(-1, 3)
     if len(raw):
         blind = min(skipped.get(BLIND, 0), len(raw) - 1)
         raw[:blind] = raw[blind]  # the wheels' own origin is no motion
         raw = compose(slam.start_pose, between(raw[0], raw))
+    watch.start()
+    finished = slam.finish()
+    watch("refinement")
+    quality = [u.quality for u in updates if u.quality is not None]
     counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64).reshape(-1, 4)
     return RunResult(
         detector=config.detector,
         stamps=stamps,
-        poses=poses,
-        covariances=np.array([u.covariance for u in updates]).reshape(-1, 3, 3),
+        poses=poses if finished is None else finished.poses,
+        covariances=covariances if finished is None else finished.covariances,
         odometry=raw,
         truth=_pose_at(truth, stamps) if truth and len(stamps) else None,
         nis=np.array([u.nis for u in updates]),
@@ -163,4 +193,8 @@ def _result(
         seconds=watch.seconds,
         skipped=skipped,
         complete=complete,
+        back_end=config.back_end,
+        online_poses=None if finished is None else poses,
+        quality=np.array(quality) if quality else None,
+        loops=() if finished is None else finished.loops,
     )

@@ -1,0 +1,94 @@
+"""How well one place is known as seen from another: covariances added up along a tree of places.
+
+Exact marginals of the graph cost more the larger it gets; this costs nothing and is on the safe side, for it follows
+only the best chain between two places.
+"""
+
+import numpy as np
+
+from contourslam.contour.contours import Floats
+from contourslam.kernels import kernel
+
+# Columns of the sums from the root to a node: xx, xy, yy, theta, theta x, theta y, theta xx, theta xy, theta yy, where
+# x, y is the place where the heading was lost.
+SUMS = 9
+
+
+@kernel
+def _common(parents: np.ndarray, a: int, b: int) -> int:
+    """Nearest common ancestor; a parent's number is smaller than its child's."""
+    while a != b:
+        if a > b:
+            a = parents[a]
+        else:
+            b = parents[b]
+    return a
+
+
+class DoubtTree:
+    """Places, each with the one from which it is best known; changed in place."""
+
+    def __init__(self) -> None:
+        self._parents = np.zeros(16, np.int64)
+        self._sums = np.zeros((16, SUMS))
+        self.count = 0
+
+    def add(self, parent: int, pose: Floats, covariance: Floats) -> int:
+        """Add a place at `pose`, known from `parent` with `covariance` (world axes); returns its number."""
+        if self.count == len(self._parents):
+            self._parents = np.concatenate([self._parents, np.zeros_like(self._parents)])
+            self._sums = np.concatenate([self._sums, np.zeros_like(self._sums)])
+        number = self.count
+        self.count += 1
+        self._place(number, parent if number else 0, pose, covariance)
+        return number
+
+    def better(self, number: int, parent: int, pose: Floats, covariance: Floats) -> None:
+        """Let one of the newest places be known from `parent`, older than itself, where that way is the surer one."""
+        before, was = self._sums[number].copy(), int(self._parents[number])
+        self._place(number, parent, pose, covariance)
+        if _size(before, pose) <= _size(self._sums[number], pose):
+            self._sums[number], self._parents[number] = before, was
+            return
+        for child in range(number + 1, self.count):  # one at most: the local map that has been begun since
+            if self._parents[child] == number:
+                self._sums[child] += self._sums[number] - before
+
+    def _place(self, number: int, parent: int, pose: Floats, covariance: Floats) -> None:
+        x, y, turn = pose[0], pose[1], covariance[2, 2]
+        own = np.array(
+            [
+                covariance[0, 0], covariance[0, 1], covariance[1, 1],
+                turn, turn * x, turn * y, turn * x * x, turn * x * y, turn * y * y,
+            ]
+        )  # fmt: skip
+        self._parents[number] = parent
+        self._sums[number] = own + (self._sums[parent] if number else 0.0)
+
+    def between(self, first: int, second: int, pose: Floats) -> Floats:
+        """Covariance of `pose` (known from `first`) as seen from `second`, in the world's axes, shape (3, 3)."""
+        common = _common(self._parents, first, second)
+        return _spread(self._sums[first] + self._sums[second] - 2.0 * self._sums[common], pose)
+
+    def from_start(self, number: int, pose: Floats) -> Floats:
+        """Covariance of `pose` (known from place `number`) as seen from where the drive began."""
+        return _spread(self._sums[number], pose)
+
+
+def _spread(sums: Floats, pose: Floats) -> Floats:
+    x, y = pose[0], pose[1]
+    xx, xy, yy, t, tx, ty, txx, txy, tyy = sums
+    out = np.empty((3, 3))
+    # A turn by dt at (ex, ey) moves (x, y) by dt (-(y - ey), x - ex).
+    out[0, 0] = max(xx + t * y * y - 2.0 * y * ty + tyy, 0.0)
+    out[1, 1] = max(yy + t * x * x - 2.0 * x * tx + txx, 0.0)
+    out[0, 1] = out[1, 0] = xy - (t * x * y - x * ty - y * tx + txy)
+    out[0, 2] = out[2, 0] = -(t * y - ty)
+    out[1, 2] = out[2, 1] = t * x - tx
+    out[2, 2] = max(t, 0.0)
+    return out
+
+
+def _size(sums: Floats, pose: Floats) -> float:
+    p = _spread(sums, pose)
+    return float(p[0, 0] + p[1, 1] + 9.0 * p[2, 2])  # what a heading error does to points 3 m away

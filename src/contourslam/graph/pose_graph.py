@@ -1,0 +1,76 @@
+"""A factor graph of poses in the plane, over GTSAM: grown step by step by iSAM2, or solved at once."""
+
+import gtsam
+import numpy as np
+
+from contourslam.contour.contours import Floats
+
+# Variables are all Pose2: keyframes, corners (position and direction of the bisector), walls (a point and the normal).
+Robust = float | None  # width of a Cauchy kernel in standard deviations
+
+
+def square_root(information: Floats) -> Floats:
+    """Upper square root of an information matrix that may be singular: it returns R with R^T R = information."""
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    root: Floats = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    return np.asarray(np.linalg.qr(root, mode="r"))
+
+
+def noise_model(information: Floats, robust: Robust) -> gtsam.noiseModel.Base:
+    """GTSAM's noise model; directions without information are left free."""
+    noise = gtsam.noiseModel.Gaussian.SqrtInformation(square_root(information), False)
+    if robust is None:
+        return noise
+    return gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(robust), noise)
+
+
+def to_array(pose: gtsam.Pose2) -> Floats:
+    """x, y, heading."""
+    return np.array([pose.x(), pose.y(), pose.theta()])
+
+
+class PoseGraph:
+    """Variables and factors; changed in place.
+
+    Attributes
+    ----------
+    factors : gtsam.NonlinearFactorGraph
+        All factors so far, for the solution at once.
+    """
+
+    def __init__(self) -> None:
+        parameters = gtsam.ISAM2Params()
+        parameters.setRelinearizeThreshold(0.02)
+        parameters.relinearizeSkip = 1
+        self.isam = gtsam.ISAM2(parameters)
+        self.factors = gtsam.NonlinearFactorGraph()
+        self._new = gtsam.NonlinearFactorGraph()
+        self._values = gtsam.Values()
+
+    def add(self, key: int, pose: Floats) -> None:
+        """Bring in a variable where it is thought to be."""
+        self._values.insert(key, gtsam.Pose2(*pose))
+
+    def fix(self, key: int, pose: Floats, sigmas: Floats) -> None:
+        """Tie a variable to the world."""
+        self._put(gtsam.PriorFactorPose2(key, gtsam.Pose2(*pose), gtsam.noiseModel.Diagonal.Sigmas(sigmas)))
+
+    def relate(self, first: int, second: int, pose: Floats, information: Floats, robust: Robust = None) -> None:
+        """Say where `second` lies, seen from `first`; `information` is in the frame of `second`."""
+        self._put(gtsam.BetweenFactorPose2(first, second, gtsam.Pose2(*pose), noise_model(information, robust)))
+
+    def _put(self, factor: gtsam.NonlinearFactor) -> None:
+        self._new.push_back(factor)
+        self.factors.push_back(factor)
+
+    def update(self, more: int = 0) -> None:
+        """Let iSAM2 take in what is new; `more` further steps where much has moved."""
+        self.isam.update(self._new, self._values)
+        for _ in range(more):
+            self.isam.update()
+        self._new = gtsam.NonlinearFactorGraph()
+        self._values = gtsam.Values()
+
+    def pose(self, key: int) -> Floats:
+        """Estimate of one variable."""
+        return to_array(self.isam.calculateEstimatePose2(key))

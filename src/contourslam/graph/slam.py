@@ -1,0 +1,235 @@
+"""The streaming object over the graph: contours give the motion, the graph binds what was seen before."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour.contours import Floats
+from contourslam.detectors import Detector, make_detector
+from contourslam.geometry.poses import between_one, compose, compose_one
+from contourslam.graph.doubt import DoubtTree
+from contourslam.graph.loops import LoopFinder, Tie
+from contourslam.graph.places import Place, Places
+from contourslam.graph.pose_graph import PoseGraph
+from contourslam.landmarks import trace
+from contourslam.matching.odometry import FLOOR, ContourOdometry, LocalMap, Step
+from contourslam.matching.oriented import move, oriented_points
+from contourslam.matching.small import invert, moved, turned
+from contourslam.scan import LaserScan, Odometry
+from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.mapper import Finished
+from contourslam.slam.result import Loop, ScanUpdate
+from contourslam.slam.wheels import Wheels
+
+# A match leaves this much open where the contours say nothing (m, m, rad), so that its covariance is finite.
+OPEN = np.diag([1.0 / 10.0**2, 1.0 / 10.0**2, 1.0 / 1.0**2])
+ROBUST_WHEELS, ROBUST_TIES = 1.0, 3.0  # widths of the Cauchy kernels, in standard deviations
+# Heading lost by contour odometry after one metre, rad: what lidars err alike in from scan to scan (bias with the angle
+# of incidence) adds up along a wall, beyond what the noise of the points explains.
+HEADING_PER_M = math.radians(0.35)
+START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
+REFRESH = 20  # keyframes after which the places are asked anew where they are
+STEPS_AFTER_LOOP = 5
+
+
+def match_information(information: Floats, heading: float) -> Floats:
+    """Information of an alignment in the frame of what was aligned, with what a match never knows better than."""
+    return invert(invert(turned(information, -heading) + OPEN) + FLOOR)
+
+
+class GraphSlam:
+    """Graph SLAM over keyframes, corners and walls of a 2-D lidar.
+
+    Parameters
+    ----------
+    config : Config
+    detector : Detector, optional
+        A detector object of one's own; by default the one that the configuration names.
+    initial_pose : ndarray, shape (3,), optional
+        x (m), y (m), heading (rad) of the base in the world where it starts; the origin by default.
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    lap : callable, optional
+        Called with the name of each stage when it is done, for those who measure time; the core reads no clock.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration names a detector that does not exist.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        detector: Detector | None = None,
+        *,
+        initial_pose: Floats | None = None,
+        lidar_mount: Floats | None = None,
+        lap: Callable[[str], None] = lambda stage: None,
+    ) -> None:
+        self.config = config
+        self.detector = detector or make_detector(config.detector, adapted=config.adapted)
+        lidar = config.lidar
+        mount = (lidar.mount_x, lidar.mount_y, lidar.mount_yaw) if lidar_mount is None else lidar_mount
+        self.mount: Floats = np.array(mount, dtype=np.float64)
+        self.start_pose: Floats = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64)
+        self._wheels = Wheels(config.slam)
+        self._contour = ContourOdometry(lidar.max_range)
+        self._graph = PoseGraph()
+        self._places, self._doubt = Places(), DoubtTree()
+        self._finder = LoopFinder(self._places, self._doubt)
+        # Of each keyframe: its pose in the frame of the contour odometry, its contour points, its stamp.
+        self._locals: list[Floats] = []
+        self._oriented: list[Floats] = []
+        self._stamps: list[float] = []
+        # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
+        self._scans: list[tuple[int, Floats, Floats]] = []
+        self._ties: list[tuple[int, Tie]] = []
+        self._nodes: dict[int, int] = {}
+        self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
+        self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
+        self._key_pose = self.start_pose
+        self._travelled = 0.0
+        self._lap = lap
+
+    def push_odometry(self, odometry: Odometry) -> None:
+        """Take in one odometry reading."""
+        self._wheels.push(odometry)
+
+    @property
+    def odometry_pose(self) -> Floats:
+        """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
+        return self._wheels.pose
+
+    def push_scan(self, scan: LaserScan) -> ScanUpdate:
+        """Align one scan; where it is far enough from the last keyframe, bind it into the graph.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            Its odometry up to its last beam should have come before; what is missing is guessed from the last motion.
+
+        Returns
+        -------
+        ScanUpdate
+        """
+        motion = self._wheels.during(scan)
+        contours = trace(scan, self.config, motion, self.mount)
+        self._lap("contour")
+        oriented = move(oriented_points(contours), self.mount)
+        increment, noise = self._wheels.step_or_guess(scan.stamp, motion, self._last_step, self._last_elapsed)
+        before = self._contour.pose
+        step = self._contour.push(oriented, increment, noise)
+        self._last_step, self._last_elapsed = between_one(before, step.pose), scan.stamp - self._stamp
+        self._stamp = scan.stamp
+        self._since, self._since_noise = moved(self._since, self._since_noise, increment, noise)
+        self._lap("matching")
+        if step.keyframe is not None:
+            self._stamps.append(scan.stamp)
+            self._add_keyframe(step.keyframe, step, oriented)
+            self._lap("graph")
+        seen = between_one(self._locals[-1], step.pose)
+        pose = compose_one(self._key_pose, seen)
+        self._scans.append((len(self._locals) - 1, seen, step.covariance))
+        covariance = self._doubt.from_start(self._nodes[step.anchor], pose) + turned(
+            step.covariance, pose[2] - step.pose[2]
+        )
+        return ScanUpdate(scan.stamp, pose, covariance, 0, 0, (), (), (), (), 0.0, 0, step.quality)
+
+    def corner_map(self) -> CornerMap:
+        """Corners of the map as they stand now."""
+        raise NotImplementedError
+
+    def wall_map(self) -> WallMap:
+        """Walls of the map as they stand now."""
+        raise NotImplementedError
+
+    def finish(self) -> Finished:
+        """Poses of all scans as the graph has them now, and the loops."""
+        if not self._scans:
+            return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
+        keys = np.array([self._graph.pose(k) for k in range(len(self._locals))])
+        poses = compose(keys[[k for k, _, _ in self._scans]], np.array([seen for _, seen, _ in self._scans]))
+        return Finished(poses, np.array([c for _, _, c in self._scans]), self._loops())
+
+    def _loops(self) -> tuple[Loop, ...]:
+        loops = []
+        for keyframe, tie in self._ties:
+            place = self._places.list[tie.place]
+            loops.append(
+                Loop(
+                    earlier_stamp=self._stamps[place.anchor],
+                    later_stamp=self._stamps[keyframe],
+                    relative_pose=between_one(place.pose, tie.pose),
+                    covariance=invert(match_information(tie.alignment.information, tie.pose[2])),
+                    shift=tie.shift,
+                    method=tie.method,
+                    pairs=tie.alignment.pairs,
+                    residual=tie.alignment.residual,
+                    overlap=tie.alignment.overlap,
+                    runner_up=tie.runner_up,
+                )
+            )
+        return tuple(loops)
+
+    def _add_keyframe(self, key: int, step: Step, oriented: Floats) -> None:
+        """Bind a keyframe to the one before, to the local map it was aligned to, and to old places around it."""
+        graph = self._graph
+        last = self._locals[-1] if self._locals else step.pose
+        pose = compose_one(self._key_pose, between_one(last, step.pose))
+        self._locals.append(step.pose)
+        self._oriented.append(oriented.astype(np.float32))
+        graph.add(key, pose)
+        if key == 0:
+            graph.fix(0, pose, START)
+        else:
+            wheel_noise = turned(self._since_noise, -self._since[2])
+            graph.relate(key - 1, key, self._since, invert(wheel_noise + 1e-8 * np.eye(3)), ROBUST_WHEELS)
+            if step.alignment is not None:
+                information = match_information(step.alignment.information, step.pose[2])
+                graph.relate(step.anchor, key, between_one(self._locals[step.anchor], step.pose), information)
+        self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
+        self._travelled += math.hypot(step.pose[0] - last[0], step.pose[1] - last[1])
+        self._grow_tree(step, pose)
+        closed = self.config.graph.loops and self._tie(key, step, oriented, pose)
+        graph.update(STEPS_AFTER_LOOP if closed else 0)
+        self._key_pose = graph.pose(key)
+        if closed or key % REFRESH == 0:
+            self._places.move(np.array([graph.pose(p.anchor) for p in self._places.list]).reshape(-1, 3))
+        if step.finished is not None:
+            self._finish_place(step.finished)
+
+    def _tie(self, key: int, step: Step, oriented: Floats, pose: Floats) -> bool:
+        """Tie a keyframe to old places; True where a loop was closed that a search had to find."""
+        node = self._nodes[step.anchor]
+        ties, unsure = self._finder.ties(oriented, pose, node)
+        found = [(key, tie) for tie in ties]
+        if unsure and not ties and self._contour.active is not None:
+            patch = self._contour.active.cells
+            found = self._finder.search(patch, step.pose, pose, unsure, node, key, self._travelled)
+        for keyframe, tie in found:
+            place = self._places.list[tie.place]
+            information = match_information(tie.alignment.information, tie.pose[2])
+            self._graph.relate(place.anchor, keyframe, between_one(place.pose, tie.pose), information, ROBUST_TIES)
+            self._ties.append((keyframe, tie))
+            self._doubt.better(node, place.node, pose, turned(invert(information), pose[2]))
+        return any(tie.method != "nearby" for _, tie in found)
+
+    def _grow_tree(self, step: Step, pose: Floats) -> None:
+        """Give a local map that has just been begun its node in the tree of doubt."""
+        begun = self._contour.newest
+        if begun.anchor in self._nodes:
+            return
+        covariance = turned(step.covariance, pose[2] - step.pose[2])
+        way = between_one(self._locals[step.anchor], step.pose)
+        covariance[2, 2] += HEADING_PER_M**2 * math.hypot(way[0], way[1])
+        self._nodes[begun.anchor] = self._doubt.add(self._nodes.get(step.anchor, 0), pose, covariance)
+
+    def _finish_place(self, local: LocalMap) -> None:
+        way = np.array([self._locals[i] for i in local.members])
+        centre = between_one(local.pose, np.array([*way[:, :2].mean(axis=0), 0.0]))
+        centre[2] = 0.0
+        place = Place(local.anchor, local.pose, local.cells, self._nodes[local.anchor], centre)
+        self._places.add(place, self._graph.pose(local.anchor))

@@ -1,0 +1,1 @@
+"""A contour aligned to other contours, and constellations of landmarks found again."""

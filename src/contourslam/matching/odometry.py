@@ -1,0 +1,196 @@
+"""Contour odometry: each scan aligned to the contours of the last few metres, with the wheels' word as the prior."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from contourslam.contour.contours import Floats
+from contourslam.geometry.poses import between_one, compose_one
+from contourslam.matching.align import Alignment, align
+from contourslam.matching.cell_map import CellMap
+from contourslam.matching.rescue import LOOSE, find_again
+from contourslam.matching.small import invert, moved
+
+KEY_DISTANCE, KEY_TURN = 0.4, math.radians(20.0)  # a scan this far from the last keyframe becomes one
+LENGTH = 6.0  # m of driving that a local map takes in
+FEWEST = 4  # keyframes in a local map that scans are aligned to
+LEAST_POINTS = 8  # a scan with fewer contour points is not aligned
+# What a match adds to the doubt however many points agree: neighbouring points err alike. Per 0.1 m or 0.1 rad moved.
+FLOOR = np.diag([0.003**2, 0.003**2, math.radians(0.1) ** 2])
+# The wheels' covariance counts for so much more beside the contours': a prior too tight pulls each step the same way,
+# and the heading drifts; one too loose costs next to nothing.
+LOOSER = 9.0
+POOR = 0.6  # an overlap below this part of the usual one says that the alignment may be wrong
+
+
+class LocalMap:
+    """Contours of a stretch of the drive; changed in place as keyframes come in.
+
+    Attributes
+    ----------
+    anchor : int
+        The keyframe whose pose the map moves with.
+    pose : ndarray, shape (3,)
+        That keyframe in the frame of the contour odometry.
+    covariance : ndarray, shape (3, 3)
+        Of the robot's pose about this map, in the axes of the odometry's frame.
+    cells : CellMap
+        In the frame of the contour odometry.
+    members : list of int
+        Keyframes whose contours it holds.
+    travelled : float
+        Length of the stretch, m.
+    """
+
+    def __init__(self, anchor: int, pose: Floats, half_width: float) -> None:
+        self.anchor, self.pose = anchor, pose
+        self.covariance: Floats = FLOOR.copy()
+        self.cells = CellMap(pose, half_width)
+        self.members: list[int] = []
+        self.travelled = 0.0
+
+    def insert(self, keyframe: int, oriented: Floats, pose: Floats, distance: float) -> None:
+        """Take in the contours of a keyframe."""
+        self.cells.insert(oriented, pose)
+        self.members.append(keyframe)
+        self.travelled += distance
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One scan in the frame of the contour odometry.
+
+    Attributes
+    ----------
+    pose, covariance : ndarray, shape (3,) and (3, 3)
+        Of the base; the covariance is about the local map, in the axes of the odometry's frame.
+    alignment : Alignment or None
+        None where there was nothing to align.
+    anchor : int
+        Anchor of the local map that the scan was aligned to.
+    quality : float
+        Overlap as a part of the usual one, at most 1; 0 where nothing was aligned.
+    slipped : bool
+        True where the alignment contradicts the increment.
+    keyframe : int or None
+        Number of the keyframe that the scan became.
+    finished : LocalMap or None
+        A local map that took in its last keyframe before this scan.
+    """
+
+    pose: Floats
+    covariance: Floats
+    alignment: Alignment | None
+    anchor: int
+    quality: float
+    slipped: bool
+    keyframe: int | None
+    finished: LocalMap | None
+
+
+class ContourOdometry:
+    """Poses in a frame that drifts slowly and never jumps; changed in place by every scan.
+
+    Parameters
+    ----------
+    max_range : float
+        No contour point lies farther from the robot than this, m.
+    """
+
+    def __init__(self, max_range: float) -> None:
+        self._half_width = max_range + LENGTH
+        self.pose: Floats = np.zeros(3)
+        self.active: LocalMap | None = None
+        self._following: LocalMap | None = None
+        self.keyframes = 0
+        self._last_key: Floats = np.zeros(3)
+        self._usual = 0.0
+        self._motion: Floats = np.zeros(3)  # between the last two scans
+        self._trusted: Floats = np.zeros(3)  # where the wheels have it, from the last scan that agreed with them
+
+    def push(self, oriented: Floats, increment: Floats, noise: Floats) -> Step:
+        """Align a scan.
+
+        Parameters
+        ----------
+        oriented : ndarray, shape (n, 4)
+            Contour points and normals in the frame of the base.
+        increment : ndarray, shape (3,)
+            Motion since the last scan as the wheels, or a guess, have it, in the frame of the base then.
+        noise : ndarray, shape (3, 3)
+            Its covariance.
+
+        Returns
+        -------
+        Step
+        """
+        share = min((math.hypot(increment[0], increment[1]) + abs(increment[2])) / 0.1, 1.0)
+        before = self.pose
+        noise = LOOSER * noise + share * FLOOR
+        for local in (self.active, self._following):
+            if local is not None:
+                self.pose, local.covariance = moved(before, local.covariance, increment, noise)
+        self._trusted = compose_one(self._trusted, increment)
+        found, quality, slipped = None, 0.0, False
+        active = self.active
+        if active is not None and len(oriented) >= LEAST_POINTS:
+            steady = compose_one(before, self._motion)
+            found, quality, slipped = self._align(oriented, active, [self.pose, steady, self._trusted])
+        if not slipped:
+            self._trusted = self.pose
+        self._motion = between_one(before, self.pose)
+        anchor = 0 if active is None else active.anchor
+        distance, turn = self._since_keyframe()
+        keyframe, finished = None, None
+        if active is None or distance > KEY_DISTANCE or turn > KEY_TURN:
+            keyframe = self.keyframes
+            finished = self._keep(oriented, distance)
+        about = active or self.newest
+        return Step(self.pose, about.covariance, found, anchor, quality, slipped, keyframe, finished)
+
+    def _align(self, oriented: Floats, active: LocalMap, expected: list[Floats]) -> tuple[Alignment, float, bool]:
+        """Align where the wheels have the scan, and where that fits badly, elsewhere."""
+        prior, slipped = invert(active.covariance), False
+        found = align(oriented, active.cells, self.pose, prior)
+        if found.overlap < POOR * self._usual:
+            enough = (POOR + 0.2) * self._usual
+            found, slipped = find_again(oriented, active.cells, expected, prior, found, enough)
+        quality = min(found.overlap / max(self._usual, 0.5), 1.0)
+        self._usual += 0.02 * (found.overlap - self._usual) if self._usual > 0.0 else found.overlap
+        self.pose = found.pose
+        for local in (active, self._following):
+            if local is not None:
+                before = LOOSE if slipped else invert(local.covariance)
+                local.covariance = invert(before + found.information)
+        return found, quality, slipped
+
+    def _since_keyframe(self) -> tuple[float, float]:
+        step = between_one(self._last_key, self.pose)
+        return math.hypot(step[0], step[1]), abs(float(step[2]))
+
+    def _keep(self, oriented: Floats, distance: float) -> LocalMap | None:
+        """Insert a keyframe; two local maps overlap by half, so that there always is one with some metres in it."""
+        number, finished = self.keyframes, None
+        if self.active is None:
+            self.active = LocalMap(number, self.pose, self._half_width)
+        for local in (self.active, self._following):
+            if local is not None:
+                local.insert(number, oriented, self.pose, distance)
+        following = self._following
+        if following is not None and self.active.travelled > LENGTH and len(following.members) >= FEWEST:
+            finished, self.active, following = self.active, following, None
+        if following is None and 2.0 * self.active.travelled > LENGTH:
+            following = LocalMap(number, self.pose, self._half_width)
+            following.insert(number, oriented, self.pose, 0.0)
+        self._following, self._last_key = following, self.pose
+        self.keyframes += 1
+        return finished
+
+    @property
+    def newest(self) -> LocalMap:
+        """The local map begun last."""
+        newest = self._following or self.active
+        if newest is None:
+            raise RuntimeError("no scan has been pushed yet")
+        return newest
