@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from contourslam.errors import ContourslamError
 from contourslam.geometry.angles import wrap
 from contourslam.geometry.poses import transform
-from contourslam.matching import search as module
-from contourslam.matching.search import Hypothesis, SearchGrid, build_search_grid, search
+from contourslam.matching import search_grid as module
+from contourslam.matching.search import Hypothesis, search
+from contourslam.matching.search_grid import SearchGrid, build_search_grid
 
 Floats = NDArray[np.float64]
 WIDE = (3.0, 3.0, math.radians(20.0))

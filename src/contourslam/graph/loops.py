@@ -12,7 +12,8 @@ from contourslam.graph.places import Places
 from contourslam.matching.align import Alignment, align
 from contourslam.matching.cell_map import CellMap
 from contourslam.matching.oriented import move
-from contourslam.matching.search import build_search_grid, search
+from contourslam.matching.search import search
+from contourslam.matching.search_grid import build_search_grid
 from contourslam.matching.small import invert, turned
 
 APART = 3  # finished places that are passed over, for the robot has hardly left them

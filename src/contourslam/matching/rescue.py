@@ -9,7 +9,8 @@ from contourslam.contour.contours import Floats
 from contourslam.geometry.poses import between_one
 from contourslam.matching.align import Alignment, align
 from contourslam.matching.cell_map import CellMap
-from contourslam.matching.search import build_search_grid, search
+from contourslam.matching.search import search
+from contourslam.matching.search_grid import build_search_grid
 
 WINDOW = np.array([0.6, 0.6, math.radians(25.0)])  # half widths of the search
 MOST_POINTS = 120
