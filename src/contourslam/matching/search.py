@@ -287,7 +287,8 @@ def search(
 
     Notes
     -----
-    With normals the score counts only points whose surface faces about the same way, as :func:`contourslam.matching.search_grid.build_search_grid` says.
+    With normals the score counts only points whose surface faces about the same way, as
+    :func:`contourslam.matching.search_grid.build_search_grid` says.
     """
     points, normals = finite_points(points, normals, "the scan's")
     middle, half = np.asarray(guess, np.float64), np.asarray(window, np.float64)
