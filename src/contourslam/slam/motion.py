@@ -7,6 +7,7 @@ import numpy as np
 from contourslam.config import MotionConfig
 from contourslam.contour.contours import Floats
 from contourslam.kernels import kernel
+from contourslam.matching.small import turned
 
 
 def motion_noise(increment: Floats, config: MotionConfig, twist_change: Floats | None = None) -> Floats:
@@ -66,7 +67,8 @@ def predict(
     linearised_at : ndarray, shape (3,)
         Pose at which the Jacobian is taken to start: the mean itself, or the first estimate of it.
     """
-    cos, sin = math.cos(mean[2]), math.sin(mean[2])
+    start = mean[2]
+    cos, sin = math.cos(start), math.sin(start)
     mean[0] += cos * increment[0] - sin * increment[1]
     mean[1] += sin * increment[0] + cos * increment[1]
     mean[2] = -((-(mean[2] + increment[2]) + math.pi) % (2.0 * math.pi) - math.pi)
@@ -74,15 +76,13 @@ def predict(
     gx, gy = -(mean[1] - linearised_at[1]), mean[0] - linearised_at[0]
     p = covariance
     xx, yx, yy, tx, ty, tt = p[0, 0], p[1, 0], p[1, 1], p[2, 0], p[2, 1], p[2, 2]
-    rxx = cos * cos * noise[0, 0] + sin * sin * noise[1, 1]
-    ryx = cos * sin * (noise[0, 0] - noise[1, 1])
-    ryy = sin * sin * noise[0, 0] + cos * cos * noise[1, 1]
-    p[0, 0] = xx + 2.0 * gx * tx + gx * gx * tt + rxx
-    p[1, 0] = yx + gx * ty + gy * tx + gx * gy * tt + ryx
-    p[1, 1] = yy + 2.0 * gy * ty + gy * gy * tt + ryy
-    p[2, 0] = tx + gx * tt
-    p[2, 1] = ty + gy * tt
-    p[2, 2] = tt + noise[2, 2]
+    r = turned(noise, start)
+    p[0, 0] = xx + 2.0 * gx * tx + gx * gx * tt + r[0, 0]
+    p[1, 0] = yx + gx * ty + gy * tx + gx * gy * tt + r[1, 0]
+    p[1, 1] = yy + 2.0 * gy * ty + gy * gy * tt + r[1, 1]
+    p[2, 0] = tx + gx * tt + r[2, 0]
+    p[2, 1] = ty + gy * tt + r[2, 1]
+    p[2, 2] = tt + r[2, 2]
     for i in range(3, size):
         p[i, 0] += gx * p[i, 2]
         p[i, 1] += gy * p[i, 2]

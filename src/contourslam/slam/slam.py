@@ -5,13 +5,15 @@ from collections.abc import Callable
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Floats, Ints
+from contourslam.contour.contours import Contours, Floats, Ints
 from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.poses import compose_one
 from contourslam.landmarks import find_landmarks, trace
+from contourslam.matching.oriented import move, oriented_points
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam import ekf
 from contourslam.slam.association import Model, associate
+from contourslam.slam.contour_motion import ContourMotion
 from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twins
 from contourslam.slam.landmark_map import CornerMap, WallMap
@@ -77,6 +79,7 @@ class ContourSlam:
         self.filter = LandmarkFilter(np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64))
         self.start_pose = self.filter.pose
         self._wheels = Wheels(config.slam)
+        self._contours = ContourMotion(lidar.max_range) if config.slam.contour_matching else None
         self._linearised_at = self.filter.pose
         self._nursery = Nursery()
         self._lap = lap
@@ -101,7 +104,7 @@ class ContourSlam:
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
-        self._predict(scan.stamp, motion)
+        quality = self._predict(scan, motion, contours)
         seen = observe(found.corners, found.walls)
         world = to_world(self.filter.mean[:3], self.mount, seen.looks)
         model = self._expect()
@@ -119,7 +122,7 @@ class ContourSlam:
         pose, covariance = self.filter.pose, self.filter.pose_covariance
         return ScanUpdate(
             scan.stamp, pose, covariance, len(found.corners), len(found.walls), matched_ids, missed, born, dropped, nis,
-            2 * len(matched),
+            2 * len(matched), quality,
         )  # fmt: skip
 
     @property
@@ -138,15 +141,22 @@ class ContourSlam:
         """Walls of the map as they stand now."""
         return self.filter.wall_map()
 
-    def _predict(self, stamp: float, motion: tuple[Floats, Floats]) -> None:
-        """Move the pose along the odometry to the scan's stamp (eqs 23-24, 28)."""
-        step = self._wheels.step(stamp, motion)
+    def _predict(self, scan: LaserScan, motion: tuple[Floats, Floats], contours: Contours) -> float | None:
+        """Move the pose to the scan's stamp along the contours' or the wheels' motion (eqs 23-24, 28)."""
+        quality = None
+        if self._contours is None:
+            step = self._wheels.step(scan.stamp, motion)
+        else:
+            oriented = move(oriented_points(contours), self.mount)
+            *step, quality = self._contours.step(scan, oriented, self._wheels, motion)
+            self._lap("matching")
         if step is None:
-            return
+            return quality
         f = self.filter
         start = self._linearised_at if self.config.slam.first_estimates else f.pose
         predict(f.mean, f.covariance, f.size, *step, start)
         self._linearised_at = f.pose
+        return quality
 
     def _expect(self) -> Model:
         f, first = self.filter, self.config.slam.first_estimates
