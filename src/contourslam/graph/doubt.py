@@ -6,7 +6,7 @@ only the best chain between two places.
 
 import numpy as np
 
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
 
 # Columns of the sums from the root to a node: xx, xy, yy, theta, theta x, theta y, theta xx, theta xy, theta yy, where
@@ -15,7 +15,7 @@ SUMS = 9
 
 
 @kernel
-def _common(parents: np.ndarray, a: int, b: int) -> int:
+def _common(parents: Ints, a: int, b: int) -> int:
     """Nearest common ancestor; a parent's number is smaller than its child's."""
     while a != b:
         if a > b:
@@ -65,27 +65,36 @@ class DoubtTree:
         self._parents[number] = parent
         self._sums[number] = own + (self._sums[parent] if number else 0.0)
 
-    def between(self, first: int, second: int, pose: Floats) -> Floats:
-        """Covariance of `pose` (known from `first`) as seen from `second`, in the world's axes, shape (3, 3)."""
-        common = _common(self._parents, first, second)
-        return _spread(self._sums[first] + self._sums[second] - 2.0 * self._sums[common], pose)
+    def between(self, first: int, others: Ints, pose: Floats) -> Floats:
+        """Covariances of `pose` (known from `first`) as seen from each of `others`, world's axes, shape (n, 3, 3)."""
+        return _between(self._parents, self._sums, first, others, pose)
 
     def from_start(self, number: int, pose: Floats) -> Floats:
         """Covariance of `pose` (known from place `number`) as seen from where the drive began."""
         return _spread(self._sums[number], pose)
 
 
+@kernel
 def _spread(sums: Floats, pose: Floats) -> Floats:
     x, y = pose[0], pose[1]
-    xx, xy, yy, t, tx, ty, txx, txy, tyy = sums
+    t, tx, ty = sums[3], sums[4], sums[5]
     out = np.empty((3, 3))
     # A turn by dt at (ex, ey) moves (x, y) by dt (-(y - ey), x - ex).
-    out[0, 0] = max(xx + t * y * y - 2.0 * y * ty + tyy, 0.0)
-    out[1, 1] = max(yy + t * x * x - 2.0 * x * tx + txx, 0.0)
-    out[0, 1] = out[1, 0] = xy - (t * x * y - x * ty - y * tx + txy)
+    out[0, 0] = max(sums[0] + t * y * y - 2.0 * y * ty + sums[8], 0.0)
+    out[1, 1] = max(sums[2] + t * x * x - 2.0 * x * tx + sums[6], 0.0)
+    out[0, 1] = out[1, 0] = sums[1] - (t * x * y - x * ty - y * tx + sums[7])
     out[0, 2] = out[2, 0] = -(t * y - ty)
     out[1, 2] = out[2, 1] = t * x - tx
     out[2, 2] = max(t, 0.0)
+    return out
+
+
+@kernel
+def _between(parents: Ints, sums: Floats, first: int, others: Ints, pose: Floats) -> Floats:
+    out = np.empty((others.size, 3, 3))
+    for i in range(others.size):
+        common = _common(parents, first, others[i])
+        out[i] = _spread(sums[first] + sums[others[i]] - 2.0 * sums[common], pose)
     return out
 
 

@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between_one, compose_one, inverse
 from contourslam.graph.doubt import DoubtTree
 from contourslam.graph.places import Places
@@ -21,14 +22,18 @@ REACH = 4.0  # a place whose middle is this near may see what the robot sees, m
 MOST_TIES = 2  # places tied to one keyframe
 SHARP, SHARP_ANGLE = 0.15, math.radians(4.0)  # standard deviations up to which a scan is aligned without a search
 LEAST_SIGMA = np.array([0.05, 0.05, math.radians(1.0)])  # what the doubt is never taken to be less than
+GATE = 16.0  # squared Mahalanobis distance by which a tie may shift the pose
 LEAST_OVERLAP = 0.55
 # The search: window, points of the patch, how good the best must be, and how much better than the next.
 WINDOW = np.array([8.0, 8.0, math.radians(25.0)])
-PATCH_POINTS = 250
+PATCH_POINTS, PATCH_RADIUS = 250, 15.0  # m around the robot
 LEAST_SCORE, MOST_RIVAL = 0.5, 0.85
-AGREE, AGREE_ANGLE = 0.3, math.radians(3.0)  # two looks that put the robot this close together agree
-FORGET = 12.0  # m after which a first look is forgotten
+MOST_PLACES = 2  # places looked at in one search
+AGREE, AGREE_ANGLE = 0.3, math.radians(3.0)  # two looks that put the robot this close together agree,
+BETWEEN_LOOKS = 2.5  # if they lie this far apart, m: a look from where the first was taken says nothing new
+FORGET = 15.0  # m after which a first look is forgotten
 PAUSE = 1.0  # m between two searches
+FREE = np.diag([1.0, 1.0, 1.0])  # information of a pose that is known to a metre and a radian
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +44,8 @@ class Tie:
     ----------
     place : int
         Number of the place.
-    pose : ndarray, shape (3,)
-        The keyframe in the frame of the place's cells.
     alignment : Alignment
+        Its pose is that of the keyframe seen from the place's anchor.
     shift : ndarray, shape (3,)
         From where it was thought to be, in the keyframe's frame.
     method : str
@@ -51,7 +55,6 @@ class Tie:
     """
 
     place: int
-    pose: Floats
     alignment: Alignment
     shift: Floats
     method: str
@@ -59,8 +62,20 @@ class Tie:
 
 
 @dataclass(frozen=True, slots=True)
+class Candidates:
+    """Old places that may see what the robot sees, nearest first, and the covariance of its pose as seen from each."""
+
+    numbers: Ints
+    doubts: Floats
+
+    def where(self, chosen: NDArray[np.bool_]) -> "Candidates":
+        """Those chosen by a mask."""
+        return Candidates(self.numbers[chosen], self.doubts[chosen])
+
+
+@dataclass(frozen=True, slots=True)
 class _Look:
-    """A first look: ties that wait for a second, and the robot's pose in the contour odometry then."""
+    """A first look, waiting for a second: the tie, and where the robot was in the contour odometry and in the world."""
 
     tie: Tie
     keyframe: int
@@ -84,8 +99,26 @@ class LoopFinder:
         self._searched_at = -math.inf
         self.searches = 0
 
-    def ties(self, oriented: Floats, pose: Floats, node: int) -> tuple[list[Tie], list[int]]:
-        """Align a keyframe to the old places around it, where their relative pose is known sharply.
+    def candidates(self, pose: Floats, node: int) -> tuple[Candidates, Candidates]:
+        """Old places that may be near: those known sharply enough to align to, and the others.
+
+        Parameters
+        ----------
+        pose : ndarray, shape (3,)
+            Where the robot is thought to be in the world.
+        node : int
+            Number of the active local map in the tree of doubt.
+        """
+        numbers, distances = self._places.near(pose, len(self._places) - APART, REACH + 2.0 * float(WINDOW[0]))
+        doubts = self._doubt.between(node, self._places.nodes[numbers], pose)
+        sigma = np.sqrt(doubts[:, 0, 0] + doubts[:, 1, 1])
+        near = distances < REACH + 2.0 * sigma
+        sharp = (sigma < SHARP) & (doubts[:, 2, 2] < SHARP_ANGLE**2)
+        every = Candidates(numbers, doubts)
+        return every.where(near & sharp), every.where(near & ~sharp)
+
+    def ties(self, oriented: Floats, pose: Floats, sharp: Candidates) -> list[Tie]:
+        """Align a keyframe to the old places around it whose relative pose is known sharply.
 
         Parameters
         ----------
@@ -93,49 +126,29 @@ class LoopFinder:
             Its contour points in its frame.
         pose : ndarray, shape (3,)
             Where it is thought to be in the world.
-        node : int
-            Number of the active local map in the tree of doubt.
+        sharp : Candidates
 
         Returns
         -------
         list of Tie
-        list of int
-            Places that may be near but are not known sharply enough.
         """
         found: list[Tie] = []
-        unsure: list[int] = []
-        until = len(self._places) - APART
-        for number in self._places.near(pose, until, REACH + WINDOW[0]):
-            doubt = self._doubt.between(node, self._places.list[number].node, pose)
-            sigma = math.sqrt(doubt[0, 0] + doubt[1, 1])
-            centre = self._places.centre(number)
-            distance = math.hypot(centre[0] - pose[0], centre[1] - pose[1])
-            if distance > REACH + 2.0 * sigma:
-                continue
-            if sigma > SHARP or doubt[2, 2] > SHARP_ANGLE**2:
-                unsure.append(int(number))
-            elif len(found) < MOST_TIES:
-                tie = self._tie(int(number), oriented, pose, doubt)
-                if tie is not None:
-                    found.append(tie)
-        return found, unsure
-
-    def _tie(self, number: int, oriented: Floats, pose: Floats, doubt: Floats) -> Tie | None:
-        place = self._places.list[number]
-        guess = self._places.into(number, pose)
-        prior = invert(turned(doubt, guess[2] - pose[2]) + np.diag(LEAST_SIGMA**2))
-        found = align(oriented, place.cells, guess, prior)
-        off = found.pose - guess
-        off[2] = between_one(guess, found.pose)[2]
-        if found.overlap < LEAST_OVERLAP or off @ prior @ off > 16.0:
-            return None
-        return Tie(number, found.pose, found, between_one(guess, found.pose), "nearby", 0.0)
+        for number, doubt in zip(sharp.numbers, sharp.doubts, strict=True):
+            guess = self._places.into(number, pose)
+            prior = invert(turned(doubt, guess[2] - pose[2]) + np.diag(LEAST_SIGMA**2))
+            aligned = align(oriented, self._places.cells(number), guess, prior)
+            off = aligned.pose - guess
+            off[2] = between_one(guess, aligned.pose)[2]
+            if aligned.overlap >= LEAST_OVERLAP and off @ prior @ off < GATE:
+                found.append(Tie(int(number), aligned, between_one(guess, aligned.pose), "nearby", 0.0))
+                if len(found) == MOST_TIES:
+                    break
+        return found
 
     def search(
-        self, patch: CellMap, local: Floats, pose: Floats, unsure: list[int], node: int, keyframe: int,
-        travelled: float,
-    ) -> list[tuple[int, Tie]]:  # fmt: skip
-        """Look for what was seen of late in places that may be near; ties that two looks agree on.
+        self, patch: CellMap, local: Floats, pose: Floats, unsure: Candidates, keyframe: int, travelled: float
+    ) -> list[tuple[int, Tie]]:
+        """Look for what was seen of late in places that may be near.
 
         Parameters
         ----------
@@ -143,10 +156,8 @@ class LoopFinder:
             Contours of the last metres, in the frame of the contour odometry.
         local, pose : ndarray, shape (3,)
             The robot in that frame, and where it is thought to be in the world.
-        unsure : list of int
+        unsure : Candidates
             Places to look at.
-        node : int
-            Number of the active local map in the tree of doubt.
         keyframe : int
             The newest.
         travelled : float
@@ -155,47 +166,51 @@ class LoopFinder:
         Returns
         -------
         list of (int, Tie)
-            Keyframes and their ties; empty as long as nothing is certain.
+            Keyframes and their ties, once two looks some way apart agree; else empty.
         """
-        if not unsure or travelled < self._searched_at + PAUSE:
+        if not len(unsure.numbers) or travelled < self._searched_at + PAUSE:
             return []
         self._searched_at = travelled
         self._waiting = [w for w in self._waiting if travelled - w.travelled < FORGET]
         points = move(patch.points[:, :4], inverse(local))
-        for number in unsure[:2]:
-            doubt = self._doubt.between(node, self._places.list[number].node, pose)
-            tie = self._find(number, points, pose, doubt)
+        points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
+        looks = []
+        for number, doubt in zip(unsure.numbers[:MOST_PLACES], unsure.doubts, strict=False):
+            tie = self._find(int(number), points, pose, doubt)
             if tie is None:
                 continue
-            world = compose_one(self._places.anchors[number], self._places.from_anchor(number, tie.pose))
+            world = self._places.out_of(tie.place, tie.alignment.pose)
             look = _Look(tie, keyframe, local, world, travelled)
             for other in self._waiting:
-                expected = compose_one(other.world, between_one(other.local, local))
-                off = between_one(expected, world)
-                if math.hypot(off[0], off[1]) < AGREE and abs(off[2]) < AGREE_ANGLE:
+                off = between_one(compose_one(other.world, between_one(other.local, local)), world)
+                apart = travelled - other.travelled >= BETWEEN_LOOKS
+                if apart and math.hypot(off[0], off[1]) < AGREE and abs(off[2]) < AGREE_ANGLE:
                     self._waiting.clear()
                     return [(other.keyframe, other.tie), (keyframe, tie)]
-            self._waiting.append(look)
+            looks.append(look)
+        self._waiting += looks
         return []
 
     def _find(self, number: int, points: Floats, pose: Floats, doubt: Floats) -> Tie | None:
+        """Search one place, with its neighbours, for the patch; None where nothing fits, or two poses do."""
         self.searches += 1
         window = np.minimum(3.0 * np.sqrt(np.diag(doubt)) + (0.3, 0.3, 0.05), WINDOW)
         window[:2] = window[:2].max()
         guess = self._places.into(number, pose)
-        chain = [self._places.list[i].cells.points for i in self._places.chain(number)]
-        known = np.concatenate(chain)
-        grid = build_search_grid(known[:, :2], known[:, 2:4])
+        known = self._places.around(number)
+        reach = PATCH_RADIUS + window[0]
+        known = known[(np.abs(known[:, :2] - guess[:2]) < reach).all(axis=1)]
+        if not len(known) or not len(points):
+            return None
+        grid = build_search_grid(known[:, :2], known[:, 2:])
         some = points[:: max(len(points) // PATCH_POINTS, 1)]
-        results = search(grid, some[:, :2], guess, window, normals=some[:, 2:4], min_score=LEAST_SCORE, keep=2)
-        if not results:
-            return None
+        results = search(grid, some[:, :2], guess, window, normals=some[:, 2:], min_score=LEAST_SCORE, keep=2)
         rival = results[1].score / results[0].score if len(results) > 1 else 0.0
-        if rival > MOST_RIVAL:
+        if not results or rival > MOST_RIVAL:
             return None
-        cells = CellMap(guess, 60.0)
-        cells.insert(known[:, :4].copy(), np.zeros(3))
-        found = align(points, cells, results[0].pose, np.zeros((3, 3)) + np.diag([1.0, 1.0, 1.0]))
-        if found.overlap < LEAST_OVERLAP:
+        cells = CellMap(guess, reach)
+        cells.insert(known, np.zeros(3))
+        aligned = align(points, cells, results[0].pose, FREE)
+        if aligned.overlap < LEAST_OVERLAP:
             return None
-        return Tie(number, found.pose, found, between_one(guess, found.pose), "search", rival)
+        return Tie(number, aligned, between_one(guess, aligned.pose), "search", rival)

@@ -1,12 +1,35 @@
-"""Local maps that are finished: the places of the graph, each moving with the keyframe that is its anchor."""
+"""Stretches of the drive that are over: the places of the graph, each moving with the keyframe that is its anchor."""
 
+from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.geometry.poses import between_one, compose, compose_one
+from contourslam.geometry.poses import between, between_one, compose, compose_one
 from contourslam.matching.cell_map import CellMap
+from contourslam.matching.odometry import LocalMap
+
+KEPT = 48  # places whose contours are held ready; those of others are put together again from their keyframes
+
+
+@dataclass(frozen=True, slots=True)
+class Keyframe:
+    """A scan that stands for those around it.
+
+    Attributes
+    ----------
+    stamp : float
+        s.
+    local : ndarray, shape (3,)
+        Base in the frame of the contour odometry.
+    oriented : ndarray of float32, shape (n, 4)
+        Contour points and normals in the frame of the base.
+    """
+
+    stamp: float
+    local: Floats
+    oriented: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,24 +40,29 @@ class Place:
     ----------
     anchor : int
         Keyframe that it moves with.
-    pose : ndarray, shape (3,)
-        The anchor in the frame of `cells`, which is that of the contour odometry.
-    cells : CellMap
+    members : tuple of int
+        Keyframes whose contours it holds.
+    seen : ndarray, shape (n, 3)
+        Their poses seen from the anchor.
     node : int
         Its number in the tree of doubt.
-    centre : ndarray, shape (3,)
-        Middle of the robot's way through it, seen from the anchor.
     """
 
     anchor: int
-    pose: Floats
-    cells: CellMap
+    members: tuple[int, ...]
+    seen: Floats
     node: int
-    centre: Floats
 
 
 class Places:
-    """All finished local maps and where they are thought to be; changed in place.
+    """All places and where they are thought to be; changed in place.
+
+    Parameters
+    ----------
+    keyframes : list of Keyframe
+        All keyframes; grows elsewhere.
+    half_width : float
+        Contours farther than this from an anchor are left out, along x or y, m.
 
     Attributes
     ----------
@@ -43,45 +71,78 @@ class Places:
         Poses of their anchors in the world.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, keyframes: list[Keyframe], half_width: float) -> None:
         self.list: list[Place] = []
-        self.anchors: Floats = np.empty((0, 3))
-        self._offsets: Floats = np.empty((0, 3))
-        self._centres: Floats = np.empty((0, 3))
+        self._keyframes, self._half_width = keyframes, half_width
+        self._ready: OrderedDict[int, CellMap] = OrderedDict()
+        self._anchors: Floats = np.empty((16, 3))
+        self._offsets: Floats = np.zeros((16, 3))
+        self._centres: Floats = np.empty((16, 3))
+        self.nodes: Ints = np.empty(16, np.int64)
 
     def __len__(self) -> int:
         return len(self.list)
 
-    def add(self, place: Place, anchor_pose: Floats) -> None:
-        """Take in a place whose anchor lies at `anchor_pose` in the world."""
-        self.list.append(place)
-        self._offsets = np.vstack([self._offsets, place.centre])
-        self.move(np.vstack([self.anchors, anchor_pose]))
+    @property
+    def anchors(self) -> Floats:
+        """Poses of the anchors in the world, shape (n, 3)."""
+        return self._anchors[: len(self.list)]
+
+    def add(self, local: LocalMap, node: int, anchor_pose: Floats) -> None:
+        """Take in a local map that is finished, whose anchor lies at `anchor_pose` in the world."""
+        n = len(self.list)
+        if n == len(self._anchors):
+            for name in ("_anchors", "_offsets", "_centres", "nodes"):
+                old = getattr(self, name)
+                setattr(self, name, np.concatenate([old, np.zeros_like(old)]))
+        way = np.array([self._keyframes[m].local for m in local.members])
+        seen = between(local.pose, way)
+        self.list.append(Place(local.anchor, tuple(local.members), seen, node))
+        self._offsets[n, :2] = seen[:, :2].mean(axis=0)
+        self._anchors[n], self._centres[n], self.nodes[n] = anchor_pose, compose(anchor_pose, self._offsets[n]), node
 
     def move(self, anchors: Floats) -> None:
         """Say anew where all anchors lie."""
-        self.anchors, self._centres = anchors, compose(anchors, self._offsets)
+        n = len(self.list)
+        self._anchors[:n], self._centres[:n] = anchors, compose(anchors, self._offsets[:n])
 
-    def near(self, pose: Floats, until: int, reach: float) -> Ints:
-        """Numbers of the places before number `until` whose middle lies within `reach` (m), nearest first."""
+    def near(self, pose: Floats, until: int, reach: float) -> tuple[Ints, Floats]:
+        """Places before number `until` whose middle lies within `reach` (m), nearest first, and how far it is."""
         centres = self._centres[: max(until, 0)]
-        squared = (centres[:, 0] - pose[0]) ** 2 + (centres[:, 1] - pose[1]) ** 2
-        inside = np.flatnonzero(squared < reach * reach)
-        return inside[np.argsort(squared[inside], kind="stable")]
+        distance = np.hypot(centres[:, 0] - pose[0], centres[:, 1] - pose[1])
+        inside = np.flatnonzero(distance < reach)
+        order = inside[np.argsort(distance[inside], kind="stable")]
+        return order, distance[order]
+
+    def cells(self, number: int) -> CellMap:
+        """Contours of a place, in the frame of its anchor."""
+        if number in self._ready:
+            self._ready.move_to_end(number)
+            return self._ready[number]
+        place = self.list[number]
+        cells = CellMap(np.zeros(2), self._half_width)
+        for member, seen in zip(place.members, place.seen, strict=True):
+            cells.insert(self._keyframes[member].oriented, seen)
+        self._ready[number] = cells
+        if len(self._ready) > KEPT:
+            self._ready.popitem(last=False)
+        return cells
+
+    def around(self, number: int) -> Floats:
+        """Contour points of a place, the one before and the one after, in the frame of its anchor: x, y, nx, ny."""
+        from contourslam.matching.oriented import move
+
+        own = self._keyframes[self.list[number].anchor].local
+        rows = []
+        for n in range(max(number - 1, 0), min(number + 2, len(self.list))):
+            to = between_one(own, self._keyframes[self.list[n].anchor].local)
+            rows.append(move(self.cells(n).points[:, :4], to))
+        return np.concatenate(rows)
 
     def into(self, number: int, pose: Floats) -> Floats:
-        """Pose in the world as a pose in the frame of the place's cells."""
-        return compose_one(self.list[number].pose, between_one(self.anchors[number], pose))
+        """Pose in the world, as seen from a place's anchor."""
+        return between_one(self._anchors[number], pose)
 
-    def from_anchor(self, number: int, pose: Floats) -> Floats:
-        """Pose in the frame of the place's cells, as seen from its anchor."""
-        return between_one(self.list[number].pose, pose)
-
-    def centre(self, number: int) -> Floats:
-        """Middle of the robot's way through a place, in the world."""
-        centre: Floats = self._centres[number]
-        return centre
-
-    def chain(self, number: int) -> range:
-        """The place, the one before and the one after: they share the frame of their cells."""
-        return range(max(number - 1, 0), min(number + 2, len(self.list)))
+    def out_of(self, number: int, seen: Floats) -> Floats:
+        """Pose seen from a place's anchor, in the world."""
+        return compose_one(self._anchors[number], seen)

@@ -11,10 +11,10 @@ from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.poses import between_one, compose, compose_one
 from contourslam.graph.doubt import DoubtTree
 from contourslam.graph.loops import LoopFinder, Tie
-from contourslam.graph.places import Place, Places
+from contourslam.graph.places import Keyframe, Places
 from contourslam.graph.pose_graph import PoseGraph
 from contourslam.landmarks import trace
-from contourslam.matching.odometry import FLOOR, ContourOdometry, LocalMap, Step
+from contourslam.matching.odometry import FLOOR, LENGTH, ContourOdometry, Step
 from contourslam.matching.oriented import move, oriented_points
 from contourslam.matching.small import invert, moved, turned
 from contourslam.scan import LaserScan, Odometry
@@ -30,7 +30,7 @@ ROBUST_WHEELS, ROBUST_TIES = 1.0, 3.0  # widths of the Cauchy kernels, in standa
 # of incidence) adds up along a wall, beyond what the noise of the points explains.
 HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
-REFRESH = 20  # keyframes after which the places are asked anew where they are
+REFRESH = 50  # keyframes after which the places are asked anew where they are
 STEPS_AFTER_LOOP = 5
 
 
@@ -78,19 +78,16 @@ class GraphSlam:
         self._wheels = Wheels(config.slam)
         self._contour = ContourOdometry(lidar.max_range)
         self._graph = PoseGraph()
-        self._places, self._doubt = Places(), DoubtTree()
+        self._keyframes: list[Keyframe] = []
+        self._places, self._doubt = Places(self._keyframes, lidar.max_range + LENGTH), DoubtTree()
         self._finder = LoopFinder(self._places, self._doubt)
-        # Of each keyframe: its pose in the frame of the contour odometry, its contour points, its stamp.
-        self._locals: list[Floats] = []
-        self._oriented: list[Floats] = []
-        self._stamps: list[float] = []
         # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
         self._scans: list[tuple[int, Floats, Floats]] = []
         self._ties: list[tuple[int, Tie]] = []
         self._nodes: dict[int, int] = {}
         self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
-        self._key_pose = self.start_pose
+        self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
         self._travelled = 0.0
         self._lap = lap
 
@@ -127,15 +124,12 @@ class GraphSlam:
         self._since, self._since_noise = moved(self._since, self._since_noise, increment, noise)
         self._lap("matching")
         if step.keyframe is not None:
-            self._stamps.append(scan.stamp)
-            self._add_keyframe(step.keyframe, step, oriented)
+            self._add_keyframe(step.keyframe, step, Keyframe(scan.stamp, step.pose, oriented.astype(np.float32)))
             self._lap("graph")
-        seen = between_one(self._locals[-1], step.pose)
+        seen = between_one(self._keyframes[-1].local, step.pose)
         pose = compose_one(self._key_pose, seen)
-        self._scans.append((len(self._locals) - 1, seen, step.covariance))
-        covariance = self._doubt.from_start(self._nodes[step.anchor], pose) + turned(
-            step.covariance, pose[2] - step.pose[2]
-        )
+        self._scans.append((len(self._keyframes) - 1, seen, step.covariance))
+        covariance = self._key_covariance + turned(step.covariance, pose[2] - step.pose[2])
         return ScanUpdate(scan.stamp, pose, covariance, 0, 0, (), (), (), (), 0.0, 0, step.quality)
 
     def corner_map(self) -> CornerMap:
@@ -150,7 +144,7 @@ class GraphSlam:
         """Poses of all scans as the graph has them now, and the loops."""
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
-        keys = np.array([self._graph.pose(k) for k in range(len(self._locals))])
+        keys = np.array([self._graph.pose(k) for k in range(len(self._keyframes))])
         poses = compose(keys[[k for k, _, _ in self._scans]], np.array([seen for _, seen, _ in self._scans]))
         return Finished(poses, np.array([c for _, _, c in self._scans]), self._loops())
 
@@ -160,10 +154,10 @@ class GraphSlam:
             place = self._places.list[tie.place]
             loops.append(
                 Loop(
-                    earlier_stamp=self._stamps[place.anchor],
-                    later_stamp=self._stamps[keyframe],
-                    relative_pose=between_one(place.pose, tie.pose),
-                    covariance=invert(match_information(tie.alignment.information, tie.pose[2])),
+                    earlier_stamp=self._keyframes[place.anchor].stamp,
+                    later_stamp=self._keyframes[keyframe].stamp,
+                    relative_pose=tie.alignment.pose,
+                    covariance=invert(match_information(tie.alignment.information, tie.alignment.pose[2])),
                     shift=tie.shift,
                     method=tie.method,
                     pairs=tie.alignment.pairs,
@@ -174,13 +168,12 @@ class GraphSlam:
             )
         return tuple(loops)
 
-    def _add_keyframe(self, key: int, step: Step, oriented: Floats) -> None:
+    def _add_keyframe(self, key: int, step: Step, keyframe: Keyframe) -> None:
         """Bind a keyframe to the one before, to the local map it was aligned to, and to old places around it."""
-        graph = self._graph
-        last = self._locals[-1] if self._locals else step.pose
+        graph, keyframes = self._graph, self._keyframes
+        last = keyframes[-1].local if keyframes else step.pose
         pose = compose_one(self._key_pose, between_one(last, step.pose))
-        self._locals.append(step.pose)
-        self._oriented.append(oriented.astype(np.float32))
+        keyframes.append(keyframe)
         graph.add(key, pose)
         if key == 0:
             graph.fix(0, pose, START)
@@ -189,30 +182,32 @@ class GraphSlam:
             graph.relate(key - 1, key, self._since, invert(wheel_noise + 1e-8 * np.eye(3)), ROBUST_WHEELS)
             if step.alignment is not None:
                 information = match_information(step.alignment.information, step.pose[2])
-                graph.relate(step.anchor, key, between_one(self._locals[step.anchor], step.pose), information)
+                graph.relate(step.anchor, key, between_one(keyframes[step.anchor].local, step.pose), information)
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._travelled += math.hypot(step.pose[0] - last[0], step.pose[1] - last[1])
         self._grow_tree(step, pose)
-        closed = self.config.graph.loops and self._tie(key, step, oriented, pose)
+        closed = self.config.graph.loops and self._tie(key, step, pose)
         graph.update(STEPS_AFTER_LOOP if closed else 0)
         self._key_pose = graph.pose(key)
         if closed or key % REFRESH == 0:
             self._places.move(np.array([graph.pose(p.anchor) for p in self._places.list]).reshape(-1, 3))
         if step.finished is not None:
-            self._finish_place(step.finished)
+            anchor = step.finished.anchor
+            self._places.add(step.finished, self._nodes[anchor], graph.pose(anchor))
+        self._key_covariance = self._doubt.from_start(self._nodes[step.anchor], self._key_pose)
 
-    def _tie(self, key: int, step: Step, oriented: Floats, pose: Floats) -> bool:
+    def _tie(self, key: int, step: Step, pose: Floats) -> bool:
         """Tie a keyframe to old places; True where a loop was closed that a search had to find."""
         node = self._nodes[step.anchor]
-        ties, unsure = self._finder.ties(oriented, pose, node)
-        found = [(key, tie) for tie in ties]
-        if unsure and not ties and self._contour.active is not None:
+        sharp, unsure = self._finder.candidates(pose, node)
+        found = [(key, tie) for tie in self._finder.ties(self._keyframes[key].oriented, pose, sharp)]
+        if not found and self._contour.active is not None:
             patch = self._contour.active.cells
-            found = self._finder.search(patch, step.pose, pose, unsure, node, key, self._travelled)
+            found = self._finder.search(patch, step.pose, pose, unsure, key, self._travelled)
         for keyframe, tie in found:
-            place = self._places.list[tie.place]
-            information = match_information(tie.alignment.information, tie.pose[2])
-            self._graph.relate(place.anchor, keyframe, between_one(place.pose, tie.pose), information, ROBUST_TIES)
+            place, seen = self._places.list[tie.place], tie.alignment.pose
+            information = match_information(tie.alignment.information, seen[2])
+            self._graph.relate(place.anchor, keyframe, seen, information, ROBUST_TIES)
             self._ties.append((keyframe, tie))
             self._doubt.better(node, place.node, pose, turned(invert(information), pose[2]))
         return any(tie.method != "nearby" for _, tie in found)
@@ -223,13 +218,6 @@ class GraphSlam:
         if begun.anchor in self._nodes:
             return
         covariance = turned(step.covariance, pose[2] - step.pose[2])
-        way = between_one(self._locals[step.anchor], step.pose)
+        way = between_one(self._keyframes[step.anchor].local, step.pose)
         covariance[2, 2] += HEADING_PER_M**2 * math.hypot(way[0], way[1])
         self._nodes[begun.anchor] = self._doubt.add(self._nodes.get(step.anchor, 0), pose, covariance)
-
-    def _finish_place(self, local: LocalMap) -> None:
-        way = np.array([self._locals[i] for i in local.members])
-        centre = between_one(local.pose, np.array([*way[:, :2].mean(axis=0), 0.0]))
-        centre[2] = 0.0
-        place = Place(local.anchor, local.pose, local.cells, self._nodes[local.anchor], centre)
-        self._places.add(place, self._graph.pose(local.anchor))
