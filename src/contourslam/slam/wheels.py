@@ -13,6 +13,7 @@ from contourslam.slam.odometry_buffer import OdometryBuffer
 
 SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
 LONGEST = 1.0  # nor do they count as farther apart than this (s) where motion is guessed: nobody goes on for long
+MOST_CHANGE = 1.5  # nor is a step guessed more than this much longer or shorter than the last one
 STALE = 0.5  # readings that end this long before the scan (s) say nothing about it
 # Without wheels, standard deviations of the velocity that a robot has beside that of the last step: m/s, m/s, rad/s.
 CRUISE = np.array([0.2, 0.2, 0.5])
@@ -31,6 +32,7 @@ class Wheels:
         self._readings = OdometryBuffer()
         self._at_scan: Floats | None = None
         self._stamp, self._twist = -math.inf, np.zeros(3)
+        self._usual = SHORTEST  # time between two scans, s
 
     def push(self, odometry: Odometry) -> None:
         """Take in one reading."""
@@ -90,8 +92,10 @@ class Wheels:
         known = self.step(stamp, motion)
         if known is not None and (motion[0][-1] > -STALE or elapsed > LONGEST):
             return known
-        if not 0.0 < elapsed < math.inf:
+        if not math.isfinite(elapsed):
             return np.zeros(3), np.diag((CRUISE * SHORTEST) ** 2)
-        ahead = min(elapsed, LONGEST)
-        step = last_step * (ahead / max(last_elapsed, SHORTEST)) if last_elapsed > 0.0 else np.zeros(3)
-        return step, np.diag((CRUISE * max(ahead, SHORTEST)) ** 2)
+        # Stamps given late come in bunches: five scans within a millisecond were not taken so.
+        self._usual += 0.05 * (min(max(elapsed, 0.0), LONGEST) - self._usual)
+        ahead = min(max(elapsed, self._usual, SHORTEST), LONGEST)
+        ratio = min(max(ahead / max(last_elapsed, self._usual, SHORTEST), 1.0 / MOST_CHANGE), MOST_CHANGE)
+        return last_step * ratio, np.diag((CRUISE * ahead) ** 2)
