@@ -1,5 +1,6 @@
 """A recording, message by message, through the streaming object."""
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable
 from time import thread_time
@@ -13,7 +14,7 @@ from contourslam.errors import RecordingError
 from contourslam.geometry.poses import between, compose, interpolate
 from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.slam.mapper import Mapper
-from contourslam.slam.result import RunResult, ScanUpdate
+from contourslam.slam.result import OdometryReadings, RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
 Message = LaserScan | Odometry | TruePose
@@ -102,7 +103,9 @@ def replay(
     """
     watch = Stopwatch()
     slam: Mapper | None = None
-    done: list[tuple[ScanUpdate, Floats]] = []  # one list, so that Ctrl-C cannot come between two
+    # What each scan gave, raw odometry there, readings before it: one list, so that Ctrl-C cannot come between two.
+    done: list[tuple[ScanUpdate, Floats, int]] = []
+    readings = array("d")  # four numbers each: a log may hold some hundred thousand
     truth: list[TruePose] = []
     skipped: Counter[str] = Counter()
     mount = None if lidar_mount is None else np.asarray(lidar_mount, dtype=np.float64)
@@ -117,6 +120,7 @@ def replay(
             if isinstance(message, Odometry):
                 newest = message
                 waiting.append(message)
+                readings.extend((message.stamp, *message.pose.tolist()))
                 continue
             if slam is None:
                 start = initial_pose
@@ -130,7 +134,7 @@ def replay(
                 skipped[BLIND] += 1
             watch.start()
             update = slam.push_scan(message)
-            done.append((update, slam.odometry_pose))
+            done.append((update, slam.odometry_pose, len(readings) // 4))
             if on_scan is not None:
                 on_scan(message, update)
     except KeyboardInterrupt:
@@ -145,7 +149,7 @@ def replay(
         if complete:
             raise RecordingError("the recording holds no scan")
         slam = make_mapper(config, detector, initial_pose=initial_pose, lidar_mount=mount)
-    return _result(config, slam, done, truth, watch, dict(skipped), complete)
+    return _result(config, slam, done, readings, truth, watch, dict(skipped), complete)
 
 
 def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
@@ -156,21 +160,28 @@ def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
 def _result(
     config: Config,
     slam: Mapper,
-    done: list[tuple[ScanUpdate, Floats]],
+    done: list[tuple[ScanUpdate, Floats, int]],
+    numbers: "array[float]",
     truth: list[TruePose],
     watch: Stopwatch,
     skipped: dict[str, int],
     complete: bool,
 ) -> RunResult:
-    updates = [update for update, _ in done]
+    updates = [update for update, _, _ in done]
     stamps = np.array([u.stamp for u in updates])
     poses = np.array([u.pose for u in updates]).reshape(-1, 3)
     covariances = np.array([u.covariance for u in updates]).reshape(-1, 3, 3)
-    raw = np.array([odometry for _, odometry in done]).reshape(-1, 3)
+    raw = np.array([odometry for _, odometry, _ in done]).reshape(-1, 3)
+    readings = None
     if len(raw):
-        blind = min(skipped.get(BLIND, 0), len(raw) - 1)
-        raw[:blind] = raw[blind]  # the wheels' own origin is no motion
-        raw = compose(slam.start_pose, between(raw[0], raw))
+        blind = skipped.get(BLIND, 0)
+        raw[:blind] = raw[min(blind, len(raw) - 1)]  # the wheels' own origin is no motion
+        origin = raw[0]
+        raw = compose(slam.start_pose, between(origin, raw))
+        rows = np.array(numbers).reshape(-1, 4)
+        if len(rows) and blind < len(raw):
+            before = np.searchsorted([count for _, _, count in done], np.arange(len(rows)), side="right")
+            readings = OdometryReadings(rows[:, 0], compose(slam.start_pose, between(origin, rows[:, 1:])), before)
     watch.start()
     finished = slam.finish()
     watch("refinement")
@@ -197,4 +208,5 @@ def _result(
         online_poses=None if finished is None else poses,
         quality=np.array(quality) if quality else None,
         loops=() if finished is None else finished.loops,
+        readings=readings,
     )

@@ -63,16 +63,8 @@ class Evaluate:
                 raise _no_overlap(self.relations, stamps, result)
             if len(result.stamps) < 2:
                 raise ResultError(f"{folder}: holds a single scan, which no relation can judge; run more of them")
-            judged = judge(result, stamps, poses, *_wheels(folder))
+            judged = judge(result, stamps, poses)
         return run_metrics(result, aligned=self.truth is not None, relations=judged)
-
-
-def _wheels(folder: Path) -> "tuple[Floats, Floats] | tuple[()]":
-    """Read every reading of the wheels where the run kept them; its table has them at the times of the scans only."""
-    from contourslam.recordings import read_trajectory
-
-    path = folder / "odometry.tum"
-    return read_trajectory(path) if path.exists() else ()
 
 
 def _with_truth(result: "RunResult", path: Path) -> "RunResult":

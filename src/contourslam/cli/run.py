@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -15,19 +16,18 @@ from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from contourslam.evaluation.relations import JudgedRelations
     from contourslam.recordings import Message, Recording
     from contourslam.report.occupancy import OccupancyGrid
     from contourslam.slam.result import RunResult
 
-    Floats = NDArray[np.float64]
-
 _WARM_UP = 20  # scans
-DEFAULTS = Config(slam=SlamConfig(walls=True))
-"""Walls are on: on real logs corners alone are too few."""
+_GRAPH = find_spec("gtsam") is not None
+DEFAULTS = Config(
+    back_end="graph" if _GRAPH else "ekf",
+    slam=SlamConfig(walls=True, contour_matching=True),
+)
+"""The graph closes loops and so is the better one wherever GTSAM is installed. The filter gets what serves it on real
+logs: walls, because corners alone are too few, and contour matching, because wheels slip."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,13 @@ class Run:
     """Map a recording: trajectory and map of corners and walls, into a folder.
 
     The recording is a rosbag (1, 2, MCAP) or a CARMEN log, plain, .gz or .xz. The folder gets index.html (a page about
-    the run), trajectory.tum, map.geojson, map.pgm and map.yaml for Nav2's map server, map.png, metrics.json, scans.csv
+    the run), map.svg, map.geojson, trajectory.tum (a pose at each scan and odometry reading), metrics.json, scans.csv
     and config.yaml, and where the run has them trajectory_online.tum (poses as known at the time, before the
-    refinement), loops.csv (the closed loops with their evidence) and relation_errors.csv.
-    Ctrl-C stops and keeps what is done.
+    refinement), odometry.tum, loops.csv (the closed loops with their evidence) and relation_errors.csv; with --grid
+    also map.pgm and map.yaml for Nav2's map server. Ctrl-C stops and keeps what is done.
+
+    The back end is the graph, which closes loops and refines the whole map at the end, wherever the extra `graph`
+    (GTSAM) is installed, else the paper's filter (ekf); --back-end chooses.
 
     Example: contourslam run intel.log.xz --relations intel.relations.xz -o out/intel
     """
@@ -61,8 +64,8 @@ class Run:
     """Use every n-th scan only."""
     max_scans: int | None = None
     """Stop after this many scans."""
-    no_grid: Flag = False
-    """Leave out the occupancy grid (map.pgm, map.yaml), which costs a second reading of the recording."""
+    grid: Flag = False
+    """Render an occupancy grid for Nav2 too (map.pgm, map.yaml); it costs a second reading of the recording."""
     json: Json = False
     settings: Settings = field(default_factory=lambda: DEFAULTS)
 
@@ -91,45 +94,60 @@ class Run:
         return _run(self, command)
 
 
-class _Reading:
-    """The messages of a recording as the options want them; what passes by is kept where the evaluation needs it."""
+def _thinned(recording: "Recording", every: int, max_scans: int | None) -> "Iterator[Message]":
+    """Yield messages, every n-th scan only, until `max_scans` of these."""
+    from contourslam.scan import LaserScan
 
-    def __init__(self, recording: "Recording", options: Run) -> None:
-        self._recording = recording
-        self._every = options.every
-        self.odometry_stamps: list[float] = []
-        self.odometry_poses: list[Floats] = []
+    scans = used = 0
+    for message in recording.messages():
+        if isinstance(message, LaserScan):
+            scans += 1
+            if (scans - 1) % every:
+                continue
+            used += 1
+        yield message
+        if used == max_scans:
+            return
 
-    def messages(self, max_scans: int | None) -> "Iterator[Message]":
-        """Yield messages, every n-th scan only, until `max_scans` of these."""
-        from contourslam.scan import LaserScan, Odometry
 
-        scans = used = 0
-        self.odometry_stamps.clear()
-        self.odometry_poses.clear()
-        for message in self._recording.messages():
-            if isinstance(message, Odometry):
-                self.odometry_stamps.append(message.stamp)
-                self.odometry_poses.append(message.pose)
-            if isinstance(message, LaserScan):
-                scans += 1
-                if (scans - 1) % self._every:
-                    continue
-                used += 1
-            yield message
-            if used == max_scans:
-                return
+class _Opening:
+    """The first scans of a recording, kept for a rehearsal, so that the recording is read only once."""
+
+    def __init__(self, messages: "Iterator[Message]") -> None:
+        from contourslam.scan import LaserScan
+
+        self._rest = messages
+        self._error: RecordingError | None = None
+        self.messages: list[Message] = []
+        self.scans = 0
+        try:
+            for message in messages:
+                self.messages.append(message)
+                self.scans += isinstance(message, LaserScan)
+                if self.scans == _WARM_UP:
+                    break
+        except RecordingError as error:
+            self._error = error
+
+    def whole(self) -> "Iterator[Message]":
+        """Yield these and what follows them."""
+        yield from self.messages
+        if self._error is not None:
+            raise self._error
+        yield from self._rest
 
 
 def _run(options: Run, command: str) -> int:
     from contourslam.detectors import make_detector
     from contourslam.evaluation.metrics import run_metrics
+    from contourslam.evaluation.relations import judge
     from contourslam.recordings import open_recording, read_relations
     from contourslam.replay import replay
     from contourslam.report.result_folder import write_result_folder
     from contourslam.report.run_page import write_run_page
 
-    make_detector(options.settings.detector)  # an unknown name fails before any work is done
+    settings = options.settings
+    make_detector(settings.detector)  # an unknown name fails before any work is done
     relations = None if options.relations is None else read_relations(options.relations)
     recording = open_recording(
         options.recording,
@@ -138,14 +156,14 @@ def _run(options: Run, command: str) -> int:
         truth_topic=options.truth_topic,
     )
     prepare_folder(options.output, overwrite=options.overwrite)
-    reading = _Reading(recording, options)
     mount = recording.lidar_mount
     with Interrupt() as interrupt:
+        messages = UntilStopped(_thinned(recording, options.every, options.max_scans), interrupt)
         try:
-            # Compiling is no part of the time per scan, and takes as long as some thousand of them.
-            replay(UntilStopped(reading.messages(_WARM_UP), interrupt), options.settings, lidar_mount=mount)
-            messages = UntilStopped(reading.messages(options.max_scans), interrupt)
-            result = replay(progress(messages, "message"), options.settings, lidar_mount=mount)
+            opening = _Opening(iter(messages))
+            if opening.scans:  # to compile or to load the kernels is no part of the time per scan
+                replay(opening.messages, settings, lidar_mount=mount)
+            result = replay(progress(opening.whole(), "message"), settings, lidar_mount=mount)
         except RecordingError:
             if interrupt.requested:  # it holds no scan because we stopped before the first
                 raise KeyboardInterrupt from None
@@ -153,12 +171,13 @@ def _run(options: Run, command: str) -> int:
     complete = result.complete and not messages.interrupted
     result = replace(result, complete=complete, skipped={**recording.skipped, **result.skipped})
     if len(result.stamps):
-        judged = None if relations is None else _judge(result, reading, *relations)
-        metrics = run_metrics(result, relations=judged)
-        grid = None if options.no_grid else _grid(reading, result, options.settings, recording)
-        notes = write_result_folder(options.output, result, options.settings, metrics, grid=grid, command=command)
+        # A single scan has nothing to show.
+        judged = None if relations is None or len(result.stamps) < 2 else judge(result, *relations)
+        metrics = run_metrics(result, relations=judged) | {"back_end_reason": _reason(settings)}
+        grid = _grid(recording, result, options) if options.grid else None
+        notes = write_result_folder(options.output, result, settings, metrics, grid=grid, command=command)
         name = options.recording.name
-        notes += write_run_page(options.output, result, options.settings, metrics, judged, command=command, name=name)
+        notes += write_run_page(options.output, result, settings, metrics, judged, command=command, name=name)
         if grid is None:  # an earlier run's would not belong to this one
             for name in ("map.pgm", "map.yaml"):
                 (options.output / name).unlink(missing_ok=True)
@@ -174,27 +193,25 @@ def _run(options: Run, command: str) -> int:
     return 0
 
 
-def _judge(result: "RunResult", reading: _Reading, stamps: "Floats", poses: "Floats") -> "JudgedRelations | None":
-    """Hold the trajectory and raw odometry against known relative poses; a single scan has nothing to show."""
-    import numpy as np
-
-    from contourslam.evaluation.relations import judge
-
-    if len(result.stamps) < 2:
-        return None
-    return judge(result, stamps, poses, np.array(reading.odometry_stamps), np.array(reading.odometry_poses))
+def _reason(settings: Config) -> str:
+    """Say why it is this back end."""
+    if settings.back_end != DEFAULTS.back_end:
+        return "as asked for"
+    if _GRAPH:
+        return "the default, for GTSAM is installed"
+    return "GTSAM is not installed: `pip install 'contourslam[graph]'` brings the graph, which closes loops"
 
 
-def _grid(reading: _Reading, result: "RunResult", config: Config, recording: "Recording") -> "OccupancyGrid":
+def _grid(recording: "Recording", result: "RunResult", options: Run) -> "OccupancyGrid":
     """Read the recording again as far as it was used; a further Ctrl-C ends this, with what there is by then."""
     import numpy as np
 
     from contourslam.report.run_grid import run_grid
 
-    lidar = config.lidar
+    lidar = options.settings.lidar
     mount = recording.lidar_mount or (lidar.mount_x, lidar.mount_y, lidar.mount_yaw)
     with Interrupt() as interrupt:
-        messages = UntilStopped(reading.messages(len(result.stamps)), interrupt)
+        messages = UntilStopped(_thinned(recording, options.every, len(result.stamps)), interrupt)
         return run_grid(progress(messages, "message"), result, lidar_mount=np.array(mount), max_range=lidar.max_range)
 
 
@@ -206,22 +223,27 @@ def _tell(options: Run, metrics: dict[str, Any]) -> None:
     size = metrics["landmarks"]
     rate = metrics["scans_per_second"]
     print(
-        f"{options.output}: {metrics['scans']} scans, {size['corners']} corners, {size['walls']} walls"
-        + (f", {rate:.0f} scans/s" if rate else "")
+        f"{options.output}: {metrics['scans']} scans, {size['corners']} corners, {size['walls']} walls, "
+        f"{metrics['loops']} loops" + (f", {rate:.0f} scans/s" if rate else "")
     )
+    print(f"back end: {metrics['back_end']} ({metrics['back_end_reason']})")
     if metrics["rmse"]:
-        rmse, raw = metrics["rmse"], metrics["odometry_rmse"]
-        print(
-            f"RMSE against the true poses: x {rmse['x']:.3f} m, y {rmse['y']:.3f} m, heading {rmse['theta']:.4f} rad "
-            f"(raw odometry {raw['x']:.3f}, {raw['y']:.3f}, {raw['theta']:.4f})"
-        )
+        print(f"RMSE against the true poses: {_rmse(metrics['rmse'])}")
+        if metrics["online_rmse"]:
+            print(f"  as known at the time (online): {_rmse(metrics['online_rmse'])}")
+        print(f"  raw odometry: {_rmse(metrics['odometry_rmse'])}")
     if "relations" in metrics:
-        print(f"relation error: {_relation_error(metrics['relations'])}")
+        refined = ", refined at the end" if "online_relations" in metrics else ""
+        print(f"relation error{refined}: {_relation_error(metrics['relations'])}")
         if "online_relations" in metrics:
             print(f"  as known at the time (online): {_relation_error(metrics['online_relations'])}")
         print(f"  raw odometry: {_relation_error(metrics['odometry_relations'])}")
     for reason, count in metrics["skipped"].items():
         print(f"skipped {count}: {reason}")
+
+
+def _rmse(rmse: dict[str, Any]) -> str:
+    return f"x {rmse['x']:.3f} m, y {rmse['y']:.3f} m, heading {rmse['theta']:.4f} rad"
 
 
 def _relation_error(errors: dict[str, Any]) -> str:

@@ -4,8 +4,8 @@ Schema of one run (SI units, angles in rad; null where a quantity is not known o
 
 ``detector``, ``scans``, ``complete``, ``skipped``
     Name, number of scans, whether the recording was replayed to its end, what could not be used by reason.
-``rmse.x``, ``rmse.y``, ``rmse.theta``; ``odometry_rmse`` with the same keys
-    Table I, and raw odometry's own error.
+``rmse.x``, ``rmse.y``, ``rmse.theta``; ``online_rmse`` and ``odometry_rmse`` with the same keys
+    Table I; of the poses as known at the time, where they differ; and raw odometry's own error.
 ``ate.rmse``, ``.mean``, ``.median``, ``.max``, ``.rotation_rmse``, ``.aligned_rmse``
     Absolute trajectory error; the last after the rigid motion that fits best.
 ``rpe.rmse``, ``.mean``, ``.median``, ``.max``, ``.rotation_rmse``
@@ -157,19 +157,22 @@ def _merge(known: list[Any]) -> Any:
 
 
 def _against_truth(result: RunResult, aligned: bool) -> Metrics:
-    names = ("rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside", "inside_two_sigma")
+    names = ("rmse", "online_rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside", "inside_two_sigma")
     if result.truth is None or not np.isfinite(result.truth).any():
         return dict.fromkeys(names)
     poses, odometry, truth, covariances = result.poses, result.odometry, result.truth, result.covariances
+    online = result.online_poses
     if aligned:
         moved = align_first(poses, truth)
         covariances = _turned(covariances, moved[0, 2] - poses[0, 2])
         poses, odometry = moved, align_first(odometry, truth)
+        online = None if online is None else align_first(online, truth)
     errors = pose_errors(poses, truth)
     values = nees(errors, covariances)
     average = _optional(lambda: average_nees(values))
     return {
         "rmse": asdict(rmse(poses, truth)),
+        "online_rmse": None if online is None else asdict(rmse(online, truth)),
         "odometry_rmse": asdict(rmse(odometry, truth)),
         "ate": _optional(lambda: _absolute(poses, truth)),
         "rpe": _optional(lambda: _relative(poses, truth)),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.poses import between, compose
+from contourslam.slam.dense import dense_trajectory
 from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]
@@ -79,22 +80,17 @@ class JudgedRelations:
     odometry: RelationErrors
 
 
-def judge(
-    result: RunResult,
-    relation_stamps: Floats,
-    relation_poses: Floats,
-    odometry_stamps: Floats | None = None,
-    odometry_poses: Floats | None = None,
-) -> JudgedRelations:
+def judge(result: RunResult, relation_stamps: Floats, relation_poses: Floats) -> JudgedRelations:
     """Hold a run's trajectory, its online poses and raw odometry against known relative poses.
+
+    The trajectories are those of :func:`contourslam.slam.dense.dense_trajectory`: with a pose at each odometry reading.
 
     Parameters
     ----------
     result : RunResult
+        Of two scans or more.
     relation_stamps, relation_poses
         As :func:`relation_errors`.
-    odometry_stamps, odometry_poses
-        As :func:`relation_errors`; where left out, the run's own odometry at its scans.
 
     Returns
     -------
@@ -105,16 +101,16 @@ def judge(
     ValueError
         As :func:`relation_errors`.
     """
-    wheels = (result.stamps, result.odometry)
-    if odometry_stamps is not None and odometry_poses is not None and len(odometry_stamps) > 1:
-        wheels = (odometry_stamps, odometry_poses)
-    asked = (relation_stamps, relation_poses)
-    online = (
-        None if result.online_poses is None else relation_errors(result.stamps, result.online_poses, *asked, *wheels)
-    )
+    readings, asked = result.readings, (relation_stamps, relation_poses)
+    wheels = result.stamps, result.odometry
+    if readings is not None and len(readings.stamps) > 1:
+        wheels = readings.stamps, readings.poses
+    online = None
+    if result.online_poses is not None:
+        online = relation_errors(*dense_trajectory(result, online=True), *asked, *wheels)
     return JudgedRelations(
         relation_stamps,
-        relation_errors(result.stamps, result.poses, *asked, *wheels),
+        relation_errors(*dense_trajectory(result), *asked, *wheels),
         online,
         relation_errors(*wheels, *asked),
     )

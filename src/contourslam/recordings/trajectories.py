@@ -70,10 +70,8 @@ def write_trajectory(path: str | Path, stamps: ArrayLike, poses: ArrayLike) -> N
     if not (np.isfinite(times).all() and np.isfinite(rows).all()):
         raise ResultError(f"{path}: a stamp or pose of the trajectory is not finite")
     half = 0.5 * rows[:, 2]
-    text = "".join(
-        f"{t:.9f} {x:.12f} {y:.12f} 0 0 0 {qz:.12f} {qw:.12f}\n"
-        for t, x, y, qz, qw in zip(times, rows[:, 0], rows[:, 1], np.sin(half), np.cos(half), strict=True)
-    )
+    values = np.column_stack([times, rows[:, :2], np.sin(half), np.cos(half)]).tolist()
+    text = "".join(f"{t:.9f} {x:.12f} {y:.12f} 0 0 0 {qz:.12f} {qw:.12f}\n" for t, x, y, qz, qw in values)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         temporary.write_text(text, encoding="ascii")

@@ -21,9 +21,11 @@ from contourslam.report.map_reader import read_geojson
 from contourslam.report.nav2_map import write_nav2_map
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.scan_table import read_scan_table, write_scan_table
-from contourslam.slam.result import RunResult
+from contourslam.slam.dense import dense_trajectory
+from contourslam.slam.result import OdometryReadings, RunResult
 
 ONLINE = "trajectory_online.tum"
+ODOMETRY = "odometry.tum"
 LOOPS = "loops.csv"
 
 
@@ -72,7 +74,9 @@ def write_result_folder(
 ) -> tuple[str, ...]:
     """Write what a run leaves behind; files of the same names are replaced, others are left alone.
 
-    ``trajectory_online.tum`` and ``loops.csv`` are there only where the run has online poses and loops.
+    The trajectories hold a pose at each scan and at each odometry reading (:mod:`contourslam.slam.dense`).
+    ``trajectory_online.tum``, ``odometry.tum`` and ``loops.csv`` are there only where the run has online poses,
+    odometry readings and loops.
 
     Parameters
     ----------
@@ -100,13 +104,17 @@ def write_result_folder(
         If a file cannot be written.
     """
     make_folder(folder)
-    write_trajectory(folder / "trajectory.tum", result.stamps, result.poses)
+    write_trajectory(folder / "trajectory.tum", *dense_trajectory(result))
     write_scan_table(folder / "scans.csv", result)
     write_geojson(folder / "map.geojson", result.corner_map, result.wall_map)
     if result.online_poses is None:
         remove(folder / ONLINE)  # an earlier run's would not belong to this one
     else:
-        write_trajectory(folder / ONLINE, result.stamps, result.online_poses)
+        write_trajectory(folder / ONLINE, *dense_trajectory(result, online=True))
+    if result.readings is None:
+        remove(folder / ODOMETRY)
+    else:
+        write_trajectory(folder / ODOMETRY, result.readings.stamps, result.readings.poses)
     if result.loops:
         write_loop_table(folder / LOOPS, result.loops)
     else:
@@ -152,7 +160,7 @@ def read_result_folder(folder: Path) -> StoredRun:
         )
     metrics = read_metrics(folder / "metrics.json")
     corners, walls = read_geojson(folder / "map.geojson")
-    scans = read_scan_table(folder / "scans.csv")
+    scans, readings_before = read_scan_table(folder / "scans.csv")
     result = dataclasses.replace(
         scans,
         detector=str(metrics.get("detector", "")),
@@ -162,22 +170,37 @@ def read_result_folder(folder: Path) -> StoredRun:
         skipped=dict(metrics.get("skipped") or {}),
         complete=metrics.get("complete") is True,
         back_end=str(metrics.get("back_end", "ekf")),  # the only one there was before it was written down
-        online_poses=_online_poses(folder / ONLINE, len(scans.stamps)),
+        online_poses=_online_poses(folder / ONLINE, scans),
         loops=read_loop_table(folder / LOOPS),
+        readings=None if readings_before is None else _readings(folder / ODOMETRY, readings_before),
     )
     return StoredRun(result, read_config(folder / "config.yaml"), metrics)
 
 
-def _online_poses(path: Path, scans: int) -> NDArray[np.float64] | None:
-    if not path.exists():
-        return None
+def _online_poses(path: Path, scans: RunResult) -> NDArray[np.float64] | None:
+    """Give the online poses; a folder of before they stood in the table of scans has them in a file only."""
+    if scans.online_poses is not None or not path.exists():
+        return scans.online_poses
+    _, poses = _trajectory(path)
+    if len(poses) != len(scans.stamps):
+        raise ResultError(
+            f"{path}: holds {len(poses)} poses where scans.csv holds {len(scans.stamps)} scans; run it again"
+        )
+    return poses
+
+
+def _readings(path: Path, before: NDArray[np.float64]) -> OdometryReadings:
+    stamps, poses = _trajectory(path)
+    if not ((np.diff(before) >= 0).all() and (before >= 0).all() and (before <= len(stamps)).all()):
+        raise ResultError(f"{path}: holds {len(stamps)} readings, which scans.csv contradicts; run it again")
+    return OdometryReadings(stamps, poses, np.searchsorted(before, np.arange(len(stamps)), side="right"))
+
+
+def _trajectory(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     try:
-        _, poses = read_trajectory(path)
+        return read_trajectory(path)
     except RecordingError as error:
         raise ResultError(str(error)) from error
-    if len(poses) != scans:
-        raise ResultError(f"{path}: holds {len(poses)} poses where scans.csv holds {scans} scans; run it again")
-    return poses
 
 
 def read_metrics(path: Path) -> dict[str, Any]:

@@ -17,6 +17,8 @@ _COVARIANCE = ("xx", "xy", "xtheta", "yy", "ytheta", "thetatheta")
 _COUNTS = ("nis_dof", "matched", "corners", "walls")
 _TRUTH = tuple(f"true_{name}" for name in _POSE)
 _QUALITY = ("quality",)
+_ONLINE = tuple(f"online_{name}" for name in _POSE)
+_READINGS = ("readings_before",)
 COLUMNS = (
     "stamp",
     *_POSE,
@@ -25,7 +27,11 @@ COLUMNS = (
     "nis",
     *_COUNTS,
 )
-"""Columns of the table in m, rad, s; the true pose and the quality of the contour matching follow where known."""
+"""Columns of the table in m, rad, s.
+
+Where known, there follow the true pose, the quality of the contour matching, the pose as known at the time, and how
+many odometry readings came before the scan."""
+_OPTIONAL = (_TRUTH, _QUALITY, _ONLINE, _READINGS)
 _UPPER = np.triu_indices(3)
 
 _NONE = np.zeros(0, dtype=np.int64)
@@ -50,24 +56,33 @@ def write_scan_table(path: Path, result: RunResult) -> None:
     counts = [result.nis_dof, result.matched_count, result.corner_count, result.wall_count]
     columns += [count[:, None].astype(np.float64) for count in counts]
     names = COLUMNS
-    if result.truth is not None:
-        columns, names = [*columns, result.truth], names + _TRUTH
-    if result.quality is not None:
-        columns, names = [*columns, result.quality[:, None]], names + _QUALITY
-    text = io.StringIO()
-    text.write(",".join(names) + "\n")
-    for stamp, row in zip(result.stamps, np.concatenate(columns, axis=1), strict=True):
-        text.write(",".join([repr(float(stamp)), *(f"{value:.10g}" for value in row)]) + "\n")
-    write_text(path, text.getvalue())
+    quality = None if result.quality is None else result.quality[:, None]
+    known = (result.truth, quality, result.online_poses, _before(result))
+    for group, values in zip(_OPTIONAL, known, strict=True):
+        if values is not None:
+            columns, names = [*columns, values], names + group
+    line = ",".join(["{!r}", *["{:.10g}"] * (len(names) - 1)]).format  # one call a line: there may be some ten thousand
+    rows = np.concatenate([result.stamps[:, None], *columns], axis=1).tolist()
+    write_text(path, "\n".join([",".join(names), *(line(*row) for row in rows)]) + "\n")
 
 
-def read_scan_table(path: Path) -> RunResult:
+def _before(result: RunResult) -> NDArray[np.float64] | None:
+    """Odometry readings before each scan; None where they are not known."""
+    if result.readings is None:
+        return None
+    scans = np.arange(len(result.stamps))
+    return np.searchsorted(result.readings.scans_before, scans, side="right")[:, None].astype(np.float64)
+
+
+def read_scan_table(path: Path) -> tuple[RunResult, NDArray[np.float64] | None]:
     """Read the table back.
 
     Returns
     -------
-    RunResult
-        With its per-scan arrays, but for the online poses; the map is empty and the detector has no name.
+    result : RunResult
+        With its per-scan arrays; the map is empty and the detector has no name.
+    readings_before : ndarray, shape (t,), or None
+        How many odometry readings came before each scan, where the table says so.
 
     Raises
     ------
@@ -81,7 +96,7 @@ def read_scan_table(path: Path) -> RunResult:
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: is not a table of scans ({error})") from error
     names = tuple(lines[0]) if lines else ()
-    if names not in (COLUMNS, COLUMNS + _TRUTH, COLUMNS + _QUALITY, COLUMNS + _TRUTH + _QUALITY):
+    if names != COLUMNS + tuple(name for group in _OPTIONAL if group[0] in names for name in group):
         raise ResultError(
             f"{path}: line 1 is not the header of a table of scans; write it again with `contourslam run`"
         )
@@ -91,7 +106,8 @@ def read_scan_table(path: Path) -> RunResult:
             values[number] = [float(field) for field in line]
         except ValueError as error:
             raise ResultError(f"{path}: line {number + 2} must hold {len(names)} numbers") from error
-    return _result(dict(zip(names, values.T, strict=True)))
+    table = dict(zip(names, values.T, strict=True))
+    return _result(table), table.get(_READINGS[0])
 
 
 def _result(table: dict[str, NDArray[np.float64]]) -> RunResult:
@@ -105,7 +121,7 @@ def _result(table: dict[str, NDArray[np.float64]]) -> RunResult:
         poses=np.stack([table[name] for name in _POSE], axis=-1),
         covariances=covariances,
         odometry=np.stack([table[f"odometry_{name}"] for name in _POSE], axis=-1),
-        truth=np.stack([table[name] for name in _TRUTH], axis=-1) if _TRUTH[0] in table else None,
+        truth=_poses(table, _TRUTH),
         nis=table["nis"],
         nis_dof=nis_dof,
         matched_count=matched,
@@ -113,5 +129,10 @@ def _result(table: dict[str, NDArray[np.float64]]) -> RunResult:
         wall_count=walls,
         corner_map=EMPTY_CORNERS,
         wall_map=EMPTY_WALLS,
+        online_poses=_poses(table, _ONLINE),
         quality=table.get(_QUALITY[0]),
     )
+
+
+def _poses(table: dict[str, NDArray[np.float64]], names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    return np.stack([table[name] for name in names], axis=-1) if names[0] in table else None

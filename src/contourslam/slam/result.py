@@ -88,6 +88,25 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True)
+class OdometryReadings:
+    """Every odometry reading of a run, in the order of the recording.
+
+    Attributes
+    ----------
+    stamps : ndarray, shape (m,)
+        s; they may repeat and run backwards in a poor log.
+    poses : ndarray, shape (m, 3)
+        Base in the frame of :attr:`RunResult.odometry`: m, m, rad.
+    scans_before : ndarray of int, shape (m,)
+        How many scans of the run came before each reading; ascending.
+    """
+
+    stamps: Floats
+    poses: Floats
+    scans_before: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
 class RunResult:
     """A recording replayed through the filter; one row per scan.
 
@@ -125,6 +144,9 @@ class RunResult:
         How well each scan's contours fitted the local map, in [0, 1]: 0 where nothing matched; None without matching.
     loops : tuple of Loop
         Every loop that was closed.
+    readings : OdometryReadings or None
+        Raw odometry between the scans too, for poses at any time (:func:`contourslam.slam.dense.dense_trajectory`);
+        None where there is none.
     """
 
     detector: str
@@ -147,3 +169,4 @@ class RunResult:
     online_poses: Floats | None = None
     quality: Floats | None = None
     loops: tuple[Loop, ...] = ()
+    readings: OdometryReadings | None = None
