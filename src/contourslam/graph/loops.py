@@ -23,7 +23,7 @@ MOST_TIES = 2  # places tied to one keyframe
 SHARP, SHARP_ANGLE = 0.15, math.radians(4.0)  # standard deviations up to which a scan is aligned without a search
 LEAST_SIGMA = np.array([0.05, 0.05, math.radians(1.0)])  # what the doubt is never taken to be less than
 GATE = 16.0  # squared Mahalanobis distance by which a tie may shift the pose
-LEAST_OVERLAP = 0.55
+LEAST_OVERLAP = 0.65
 # The search: window, points of the patch, how good the best must be, and how much better than the next.
 WINDOW = np.array([8.0, 8.0, math.radians(25.0)])
 PATCH_POINTS, PATCH_RADIUS = 250, 15.0  # m around the robot

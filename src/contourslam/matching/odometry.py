@@ -21,7 +21,7 @@ FLOOR = np.diag([0.003**2, 0.003**2, math.radians(0.1) ** 2])
 # The wheels' covariance counts for so much more beside the contours': a prior too tight pulls each step the same way,
 # and the heading drifts; one too loose costs next to nothing.
 LOOSER = 9.0
-POOR = 0.6  # an overlap below this part of the usual one says that the alignment may be wrong
+POOR = 0.8  # an overlap below this part of the usual one says that the alignment may be wrong
 
 
 class LocalMap:
