@@ -2,13 +2,16 @@ import json
 import math
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from contourslam.cli import main
-from contourslam.recordings import read_trajectory, write_trajectory
+from contourslam.recordings import write_trajectory
+from contourslam.report.result_folder import read_result_folder
+from contourslam.report.scan_table import write_scan_table
 
 Failure = Callable[..., str]
 
@@ -51,10 +54,11 @@ def test_the_online_poses_are_judged_beside_the_refined(
     relations.write_text(f"100.0 110.0 {0.8 * np.sin(2.5)} {0.8 * (1 - np.cos(2.5))} 0 0 0 2.5\n")
     folder = tmp_path / "refined"
     shutil.copytree(mapped, folder)
-    stamps, poses = read_trajectory(folder / "trajectory.tum")
-    poses[20:, 0] += 0.25
-    poses[20:, 2] += math.radians(3.0)
-    write_trajectory(folder / "trajectory_online.tum", stamps, poses)
+    stored = read_result_folder(folder)
+    online = stored.result.poses.copy()
+    online[20:, 0] += 0.25
+    online[20:, 2] += math.radians(3.0)
+    write_scan_table(folder / "scans.csv", replace(stored.result, online_poses=online))
     assert main(["evaluate", str(folder), "--relations", str(relations), "--json"]) == 0
     metrics = json.loads(capsys.readouterr().out)[str(folder)]
     assert metrics["relations"]["translation"]["mean"] < 0.02

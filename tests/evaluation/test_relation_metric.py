@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from contourslam.evaluation.relations import judge, relation_errors
 from contourslam.geometry.poses import between, compose, interpolate
+from contourslam.slam.result import OdometryReadings
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 
@@ -193,5 +194,28 @@ def test_a_run_is_judged_with_its_online_poses_and_its_wheels(make_run):
     assert judged.online is not None
     np.testing.assert_array_equal(judged.estimate.translation, plain.estimate.translation)
     assert judged.online.translation.mean() == pytest.approx(0.5, rel=0.2)
-    finer = judge(run, stamps, poses, run.stamps, 1.1 * run.truth)
+    readings = OdometryReadings(run.stamps, 1.1 * run.truth, np.arange(len(run.stamps)))
+    finer = judge(replace(run, readings=readings), stamps, poses)
     assert finer.odometry.translation.mean() > 0.05
+
+
+def test_a_relation_at_a_readings_stamp_is_judged_by_the_order_of_the_recording(make_run):
+    # A reading every 0.1 s, every tenth with a scan, which is stamped 0.63 s late: stamps run backwards.
+    run = make_run()
+    count = len(run.stamps)
+    scans = np.arange(0, count, 10)
+    sparse = replace(
+        run,
+        stamps=run.stamps[scans] + 0.63,
+        poses=run.truth[scans],
+        odometry=run.truth[scans],
+        readings=OdometryReadings(run.stamps, run.truth, np.searchsorted(scans, np.arange(count))),
+    )
+    asked = np.arange(5, count - 10, 10)
+    first, second = asked[:-1], asked[1:]
+    stamps = run.stamps[np.stack([first, second], axis=-1)]
+    known = between(run.truth[first], run.truth[second])
+    judged = judge(sparse, stamps, known)
+    at_scans = relation_errors(sparse.stamps, sparse.poses, stamps, known, run.stamps, run.truth)
+    assert at_scans.translation.mean() > 0.01
+    assert judged.estimate.translation.max() < 1e-9

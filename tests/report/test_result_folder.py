@@ -1,4 +1,5 @@
 import dataclasses
+import itertools
 import json
 import resource
 import sys
@@ -9,10 +10,14 @@ import pytest
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import ContourslamError, ResultError
 from contourslam.evaluation.metrics import run_metrics
+from contourslam.geometry.poses import interpolate
 from contourslam.recordings import read_trajectory
 from contourslam.report.atomic import write_bytes
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.result_folder import read_metrics, read_result_folder, to_json, write_result_folder
+from contourslam.report.scan_table import read_scan_table, write_scan_table
+from contourslam.slam.dense import dense_trajectory
+from contourslam.slam.result import OdometryReadings
 
 
 def written(folder, run, **options):
@@ -92,6 +97,78 @@ def test_what_the_graph_adds_comes_back_too(tmp_path, make_graph_run):
         assert found.later_stamp == wanted.later_stamp  # stamps to the bit: they are looked up by them
 
 
+def with_readings(run):
+    """Two readings before each scan, the second at its stamp, and one after the last."""
+    stamps = np.sort(np.concatenate([run.stamps - 0.05, run.stamps, run.stamps[-1:] + 0.05]))
+    poses = interpolate(run.stamps, run.odometry, stamps)
+    before = np.append(np.repeat(np.arange(len(run.stamps)), 2), len(run.stamps))
+    return dataclasses.replace(run, readings=OdometryReadings(stamps, poses, before))
+
+
+def test_the_readings_of_the_wheels_come_back_and_give_the_same_dense_trajectories(tmp_path, make_graph_run):
+    run = with_readings(make_graph_run())
+    written(tmp_path, run)
+    back = read_result_folder(tmp_path).result
+    np.testing.assert_allclose(back.readings.stamps, run.readings.stamps, atol=1e-9)
+    np.testing.assert_array_equal(back.readings.scans_before, run.readings.scans_before)
+    np.testing.assert_allclose(back.online_poses, run.online_poses, atol=1e-9)
+    for name, online in (("trajectory.tum", False), ("trajectory_online.tum", True)):
+        stamps, poses = dense_trajectory(back, online=online)
+        filed = read_trajectory(tmp_path / name)
+        assert len(stamps) == 2 * len(run.stamps) + (0 if online else 1)
+        np.testing.assert_allclose(stamps, filed[0], atol=1e-9)
+        np.testing.assert_allclose(poses, filed[1], atol=1e-8)
+    filed = read_trajectory(tmp_path / "odometry.tum")
+    np.testing.assert_allclose(filed[1], run.readings.poses, atol=1e-9)
+
+
+def test_a_run_without_readings_leaves_none_of_an_earlier_run(tmp_path, make_run):
+    written(tmp_path, with_readings(make_run()))
+    assert (tmp_path / "odometry.tum").exists()
+    written(tmp_path, make_run())
+    assert not (tmp_path / "odometry.tum").exists()
+    assert read_result_folder(tmp_path).result.readings is None
+
+
+def test_readings_that_do_not_fit_the_scans_are_said(tmp_path, make_run):
+    written(tmp_path, with_readings(make_run()))
+    whole = (tmp_path / "odometry.tum").read_text()
+    (tmp_path / "odometry.tum").write_text("\n".join(whole.splitlines()[:-40]) + "\n")
+    with pytest.raises(ResultError, match=r"odometry\.tum: holds 561 readings"):
+        read_result_folder(tmp_path)
+    (tmp_path / "odometry.tum").unlink()
+    with pytest.raises(ResultError, match=r"odometry\.tum"):
+        read_result_folder(tmp_path)
+
+
+def as_it_was(folder):
+    """Make the folder one of before its trajectories were dense: online poses in their own file only."""
+    lines = [line.split(",") for line in (folder / "scans.csv").read_text().splitlines()]
+    kept = [i for i, name in enumerate(lines[0]) if not name.startswith("online_")]
+    (folder / "scans.csv").write_text("".join(",".join(line[i] for i in kept) + "\n" for line in lines))
+
+
+def test_a_folder_with_its_online_poses_in_a_file_of_their_own_still_loads(tmp_path, make_graph_run):
+    run = make_graph_run()
+    written(tmp_path, run)
+    as_it_was(tmp_path)
+    back = read_result_folder(tmp_path).result
+    np.testing.assert_allclose(back.online_poses, run.online_poses, atol=1e-9)
+    assert back.readings is None
+
+
+@pytest.mark.parametrize(
+    ("damage", "place"), [(lambda lines: lines[:-3], "297 poses"), (lambda lines: [*lines, "1 2"], "line 301")]
+)
+def test_damage_to_a_file_of_online_poses_is_named(tmp_path, make_graph_run, damage, place):
+    written(tmp_path, make_graph_run())
+    as_it_was(tmp_path)
+    path = tmp_path / "trajectory_online.tum"
+    path.write_text("\n".join(damage(path.read_text().splitlines())) + "\n")
+    with pytest.raises(ResultError, match=f"trajectory_online[.]tum: .*{place}"):
+        read_result_folder(tmp_path)
+
+
 def test_a_folder_from_before_there_were_loops_still_loads(tmp_path, make_run):
     written(tmp_path, make_run())
     metrics = json.loads((tmp_path / "metrics.json").read_text())
@@ -108,14 +185,14 @@ def test_a_run_without_loops_leaves_none_of_an_earlier_run(tmp_path, make_run, m
     assert not {"loops.csv", "trajectory_online.tum"} & {path.name for path in tmp_path.iterdir()}
 
 
-@pytest.mark.parametrize("quality", [True, False])
-@pytest.mark.parametrize("truth", [True, False])
-def test_every_choice_of_known_columns_comes_back(tmp_path, make_graph_run, truth, quality):
-    run = make_graph_run(scans=20)
-    run = dataclasses.replace(run, truth=run.truth if truth else None, quality=run.quality if quality else None)
-    written(tmp_path, run)
-    back = read_result_folder(tmp_path).result
-    assert (back.truth is not None, back.quality is not None) == (truth, quality)
+@pytest.mark.parametrize("known", list(itertools.product([True, False], repeat=4)))
+def test_every_choice_of_known_columns_comes_back(tmp_path, make_graph_run, known):
+    run = with_readings(make_graph_run(scans=20))
+    names = ("truth", "quality", "online_poses", "readings")
+    run = dataclasses.replace(run, **{name: None for name, there in zip(names, known, strict=True) if not there})
+    write_scan_table(tmp_path / "scans.csv", run)
+    back, before = read_scan_table(tmp_path / "scans.csv")
+    assert (*(getattr(back, name) is not None for name in names[:3]), before is not None) == known
 
 
 def test_an_incomplete_run_says_so(tmp_path, make_run):
@@ -153,11 +230,9 @@ def test_a_damaged_line_of_the_scan_table_is_numbered(tmp_path, make_run, line):
         ("loops.csv", lambda lines: [*lines[:2], lines[2] + ",1"], "line 3"),
         ("loops.csv", lambda lines: lines[1:], "line 1"),
         ("loops.csv", lambda lines: ["\0"], "loops"),
-        ("trajectory_online.tum", lambda lines: lines[:-3], "297 poses"),
-        ("trajectory_online.tum", lambda lines: [*lines, "1 2"], "line 301"),
     ],
 )
-def test_damage_to_loops_and_online_poses_is_named_by_place(tmp_path, make_graph_run, name, damage, place):
+def test_damage_to_loops_is_named_by_place(tmp_path, make_graph_run, name, damage, place):
     written(tmp_path, make_graph_run())
     path = tmp_path / name
     path.write_text("\n".join(damage(path.read_text().splitlines())) + "\n")

@@ -110,6 +110,29 @@ def test_raw_odometry_starts_where_the_estimate_starts(drive: Drive, mount: Floa
     np.testing.assert_allclose(result.odometry, compose(result.poses[0], between(wheels[0], wheels)), atol=1e-9)
 
 
+def test_every_reading_is_kept_with_the_number_of_scans_before_it(drive: Drive, mount: Floats) -> None:
+    messages = drive(20)
+    twice = [m for message in messages for m in ([message, message] if isinstance(message, Odometry) else [message])]
+    extra = Odometry(1e3, np.array([1.0, 2.0, 0.5]))  # after the last scan
+    readings = replay([*twice, extra], CONFIG, lidar_mount=mount).readings
+    assert readings is not None
+    wheels = [m for m in [*twice, extra] if isinstance(m, Odometry)]
+    before = [sum(isinstance(m, LaserScan) for m in twice[:i]) for i, m in enumerate(twice) if isinstance(m, Odometry)]
+    np.testing.assert_array_equal(readings.stamps, [m.stamp for m in wheels])
+    np.testing.assert_array_equal(readings.scans_before, [*before, 20])
+    poses = np.array([m.pose for m in wheels])
+    np.testing.assert_allclose(between(readings.poses[0], readings.poses), between(poses[0], poses), atol=1e-9)
+    result = replay(messages, CONFIG, lidar_mount=mount)
+    assert result.readings is not None
+    np.testing.assert_allclose(result.readings.poses, result.odometry, atol=1e-9)  # one frame: a reading a scan here
+
+
+def test_a_recording_without_odometry_has_no_readings(drive: Drive, mount: Floats) -> None:
+    assert replay(scans_in(drive(5, standing_from=0)), CONFIG, lidar_mount=mount).readings is None
+    late = [*scans_in(drive(5, standing_from=0)), Odometry(1e3, np.array([9.0, 9.0, 0.0]))]
+    assert replay(late, CONFIG, lidar_mount=mount).readings is None  # nothing ties it to a scan
+
+
 @pytest.mark.parametrize("before", [1, 5])
 def test_scans_before_the_first_odometry_leave_the_raw_odometry_where_it_starts(
     drive: Drive, mount: Floats, before: int

@@ -6,6 +6,8 @@ from contourslam.geometry.angles import wrap
 from contourslam.geometry.poses import between, compose
 from contourslam.slam.result import Floats, RunResult
 
+_SAME = 1e-9  # stamps closer than this (s) are the same one: files keep no more of them
+
 
 def dense_trajectory(result: RunResult, *, online: bool = False) -> tuple[Floats, Floats]:
     """Give a pose at each scan and at each odometry reading, in the order of the recording.
@@ -33,7 +35,8 @@ def dense_trajectory(result: RunResult, *, online: bool = False) -> tuple[Floats
         return result.stamps, poses
     after = readings.scans_before
     last, following = np.maximum(after - 1, 0), np.minimum(after, scans - 1)
-    kept = (readings.stamps != result.stamps[last]) & (readings.stamps != result.stamps[following])
+    kept = np.abs(readings.stamps - result.stamps[last]) > _SAME
+    kept &= np.abs(readings.stamps - result.stamps[following]) > _SAME
     if online:
         kept &= after > 0
     after, last, following = after[kept], last[kept], following[kept]
