@@ -55,9 +55,7 @@ def measured(seen: Floats, world: Floats, landmark: Floats) -> tuple[Floats, Flo
     return pose, information
 
 
-def bind(
-    graph: PoseGraph, rows: Floats, world: Floats, keys: Ints, numbers: Ints, table: Floats, fresh: Ints
-) -> None:
+def bind(graph: PoseGraph, rows: Floats, world: Floats, keys: Ints, numbers: Ints, table: Floats, fresh: Ints) -> None:
     """Add landmarks and their sightings to a graph.
 
     Parameters

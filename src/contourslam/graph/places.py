@@ -146,3 +146,8 @@ class Places:
     def out_of(self, number: int, seen: Floats) -> Floats:
         """Pose seen from a place's anchor, in the world."""
         return compose_one(self._anchors[number], seen)
+
+    def centre(self, number: int) -> Floats:
+        """Middle of the robot's way through a place, in the world: x, y, heading of the anchor."""
+        centre: Floats = self._centres[number]
+        return centre

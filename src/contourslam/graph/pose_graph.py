@@ -49,16 +49,16 @@ class PoseGraph:
 
     Attributes
     ----------
-    factors : gtsam.NonlinearFactorGraph
-        All factors so far, for the solution at once.
+    factors, ties : gtsam.NonlinearFactorGraph
+        All factors so far; the ties of keyframes to places seen before are kept apart, for they can be had anew.
     """
 
     def __init__(self) -> None:
         parameters = gtsam.ISAM2Params()
         parameters.setRelinearizeThreshold(0.02)
         parameters.relinearizeSkip = 1
-        self.isam = gtsam.ISAM2(parameters)
-        self.factors = gtsam.NonlinearFactorGraph()
+        self._isam = gtsam.ISAM2(parameters)
+        self.factors, self.ties = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph()
         self._new = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
 
@@ -68,24 +68,51 @@ class PoseGraph:
 
     def fix(self, key: int, pose: Floats, sigmas: Floats) -> None:
         """Tie a variable to the world."""
-        self._put(gtsam.PriorFactorPose2(key, gtsam.Pose2(*pose), gtsam.noiseModel.Diagonal.Sigmas(sigmas)))
+        factor = gtsam.PriorFactorPose2(key, gtsam.Pose2(*pose), gtsam.noiseModel.Diagonal.Sigmas(sigmas))
+        self._put(factor, self.factors)
 
-    def relate(self, first: int, second: int, pose: Floats, information: Floats, robust: Robust = None) -> None:
+    def relate(
+        self, first: int, second: int, pose: Floats, information: Floats, robust: Robust = None, *, tie: bool = False
+    ) -> None:
         """Say where `second` lies, seen from `first`; `information` is in the frame of `second`."""
-        self._put(gtsam.BetweenFactorPose2(first, second, gtsam.Pose2(*pose), noise_model(information, robust)))
+        self._put(relation(first, second, pose, information, robust), self.ties if tie else self.factors)
 
-    def _put(self, factor: gtsam.NonlinearFactor) -> None:
+    def _put(self, factor: gtsam.NonlinearFactor, kept: gtsam.NonlinearFactorGraph) -> None:
         self._new.push_back(factor)
-        self.factors.push_back(factor)
+        kept.push_back(factor)
 
     def update(self, more: int = 0) -> None:
         """Let iSAM2 take in what is new; `more` further steps where much has moved."""
-        self.isam.update(self._new, self._values)
+        self._isam.update(self._new, self._values)
         for _ in range(more):
-            self.isam.update()
+            self._isam.update()
         self._new = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
 
     def pose(self, key: int) -> Floats:
         """Estimate of one variable."""
-        return to_array(self.isam.calculateEstimatePose2(key))
+        return to_array(self._isam.calculateEstimatePose2(key))
+
+    def estimate(self) -> gtsam.Values:
+        """Estimate of all variables."""
+        return self._isam.calculateEstimate()
+
+
+def relation(
+    first: int, second: int, pose: Floats, information: Floats, robust: Robust = None
+) -> gtsam.BetweenFactorPose2:
+    """Give the factor that says where `second` lies, seen from `first`; `information` is in the frame of `second`."""
+    return gtsam.BetweenFactorPose2(first, second, gtsam.Pose2(*pose), noise_model(information, robust))
+
+
+def solve(factors: gtsam.NonlinearFactorGraph, start: gtsam.Values) -> gtsam.Values:
+    """Solve a graph at once, by Levenberg and Marquardt."""
+    parameters = gtsam.LevenbergMarquardtParams()
+    parameters.setMaxIterations(30)
+    parameters.setRelativeErrorTol(1e-5)
+    return gtsam.LevenbergMarquardtOptimizer(factors, start, parameters).optimize()
+
+
+def poses_of(values: gtsam.Values, count: int) -> Floats:
+    """Poses of the keyframes 0 to `count` - 1, shape (count, 3)."""
+    return np.array([to_array(values.atPose2(key)) for key in range(count)]).reshape(-1, 3)

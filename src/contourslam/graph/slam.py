@@ -8,13 +8,16 @@ import numpy as np
 from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.detectors import Detector, make_detector
-from contourslam.geometry.poses import between_one, compose, compose_one
+from contourslam.geometry.poses import between, between_one, compose, compose_one
 from contourslam.graph.doubt import DoubtTree
+from contourslam.graph.landmarks import NOTHING, Landmarks
 from contourslam.graph.loops import LoopFinder, Tie
+from contourslam.graph.matches import ROBUST_TIES, match_information
 from contourslam.graph.places import Keyframe, Places
-from contourslam.graph.pose_graph import PoseGraph
+from contourslam.graph.pose_graph import PoseGraph, poses_of
+from contourslam.graph.refine import refine
 from contourslam.landmarks import trace
-from contourslam.matching.odometry import FLOOR, LENGTH, ContourOdometry, Step
+from contourslam.matching.odometry import LENGTH, ContourOdometry, Step
 from contourslam.matching.oriented import move, oriented_points
 from contourslam.matching.small import invert, moved, turned
 from contourslam.scan import LaserScan, Odometry
@@ -23,20 +26,13 @@ from contourslam.slam.mapper import Finished
 from contourslam.slam.result import Loop, ScanUpdate
 from contourslam.slam.wheels import Wheels
 
-# A match leaves this much open where the contours say nothing (m, m, rad), so that its covariance is finite.
-OPEN = np.diag([1.0 / 10.0**2, 1.0 / 10.0**2, 1.0 / 1.0**2])
-ROBUST_WHEELS, ROBUST_TIES = 1.0, 3.0  # widths of the Cauchy kernels, in standard deviations
+ROBUST_WHEELS = 1.0  # width of the Cauchy kernel, in standard deviations
 # Heading lost by contour odometry after one metre, rad: what lidars err alike in from scan to scan (bias with the angle
 # of incidence) adds up along a wall, beyond what the noise of the points explains.
 HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
 REFRESH = 50  # keyframes after which the places are asked anew where they are
 STEPS_AFTER_LOOP = 5
-
-
-def match_information(information: Floats, heading: float) -> Floats:
-    """Information of an alignment in the frame of what was aligned, with what a match never knows better than."""
-    return invert(invert(turned(information, -heading) + OPEN) + FLOOR)
 
 
 class GraphSlam:
@@ -83,6 +79,7 @@ class GraphSlam:
         self._finder = LoopFinder(self._places, self._doubt)
         # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
         self._scans: list[tuple[int, Floats, Floats]] = []
+        self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
         self._ties: list[tuple[int, Tie]] = []
         self._nodes: dict[int, int] = {}
         self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
@@ -123,30 +120,54 @@ class GraphSlam:
         self._stamp = scan.stamp
         self._since, self._since_noise = moved(self._since, self._since_noise, increment, noise)
         self._lap("matching")
+        count = NOTHING
         if step.keyframe is not None:
             self._add_keyframe(step.keyframe, step, Keyframe(scan.stamp, step.pose, oriented.astype(np.float32)))
             self._lap("graph")
+            node = self._nodes[step.anchor]
+            count = self._landmarks.take(scan, contours, step.keyframe, self._key_pose, node, self._graph, self._lap)
         seen = between_one(self._keyframes[-1].local, step.pose)
         pose = compose_one(self._key_pose, seen)
         self._scans.append((len(self._keyframes) - 1, seen, step.covariance))
         covariance = self._key_covariance + turned(step.covariance, pose[2] - step.pose[2])
-        return ScanUpdate(scan.stamp, pose, covariance, 0, 0, (), (), (), (), 0.0, 0, step.quality)
+        return ScanUpdate(
+            scan.stamp, pose, covariance, count.corners, count.walls, count.matched, count.missed, count.born,
+            count.dropped, 0.0, 0, step.quality,
+        )  # fmt: skip
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
-        raise NotImplementedError
+        return self._landmarks.maps(self._key_poses())[0]
 
     def wall_map(self) -> WallMap:
         """Walls of the map as they stand now."""
-        raise NotImplementedError
+        return self._landmarks.maps(self._key_poses())[1]
+
+    def _key_poses(self) -> Floats:
+        return np.array([self._graph.pose(k) for k in range(len(self._keyframes))]).reshape(-1, 3)
 
     def finish(self) -> Finished:
-        """Poses of all scans as the graph has them now, and the loops."""
+        """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
-        keys = np.array([self._graph.pose(k) for k in range(len(self._keyframes))])
-        poses = compose(keys[[k for k, _, _ in self._scans]], np.array([seen for _, seen, _ in self._scans]))
+        values = self._graph.estimate()
+        if self.config.graph.refine:
+            values = refine(self._graph, self._keyframes, self._places)
+        poses = self._along(poses_of(values, len(self._keyframes)))
         return Finished(poses, np.array([c for _, _, c in self._scans]), self._loops())
+
+    def _along(self, keys: Floats) -> Floats:
+        """Poses of all scans between those of the keyframes: carried on from the one before, and to the one after."""
+        which = np.array([key for key, _, _ in self._scans])
+        seen = np.array([pose for _, pose, _ in self._scans])
+        poses = compose(keys[which], seen)
+        after = np.minimum(which + 1, len(keys) - 1)
+        local = np.array([k.local for k in self._keyframes])
+        other = compose(keys[after], between(local[after], compose(local[which], seen)))
+        begin = np.searchsorted(which, which)
+        count = np.searchsorted(which, which, side="right") - begin
+        weight = np.where(after > which, (np.arange(len(which)) - begin) / count, 0.0)
+        return compose(poses, between(poses, other) * weight[:, None])
 
     def _loops(self) -> tuple[Loop, ...]:
         loops = []
@@ -189,6 +210,8 @@ class GraphSlam:
         closed = self.config.graph.loops and self._tie(key, step, pose)
         graph.update(STEPS_AFTER_LOOP if closed else 0)
         self._key_pose = graph.pose(key)
+        if closed:
+            self._landmarks.refresh()
         if closed or key % REFRESH == 0:
             self._places.move(np.array([graph.pose(p.anchor) for p in self._places.list]).reshape(-1, 3))
         if step.finished is not None:
@@ -207,7 +230,7 @@ class GraphSlam:
         for keyframe, tie in found:
             place, seen = self._places.list[tie.place], tie.alignment.pose
             information = match_information(tie.alignment.information, seen[2])
-            self._graph.relate(place.anchor, keyframe, seen, information, ROBUST_TIES)
+            self._graph.relate(place.anchor, keyframe, seen, information, ROBUST_TIES, tie=True)
             self._ties.append((keyframe, tie))
             self._doubt.better(node, place.node, pose, turned(invert(information), pose[2]))
         return any(tie.method != "nearby" for _, tie in found)

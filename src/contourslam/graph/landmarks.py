@@ -1,0 +1,323 @@
+"""Corners and walls while the drive goes on: seen, recognised, born into the graph, counted, dropped."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.config import Config
+from contourslam.contour.contours import Contours, Floats, Ints
+from contourslam.detectors import Detector
+from contourslam.geometry.poses import compose_one
+from contourslam.graph.association import NONE, WIDE_GATES, associate, near
+from contourslam.graph.doubt import DoubtTree
+from contourslam.graph.landmark_factors import LANDMARK, bind
+from contourslam.graph.landmark_maps import judge, records, to_maps
+from contourslam.graph.landmark_set import find_landmark_set
+from contourslam.graph.pose_graph import PoseGraph
+from contourslam.graph.sightings import (
+    COLUMNS,
+    CONVEX,
+    DIRECTION,
+    END,
+    KIND,
+    OPENING,
+    START,
+    Sightings,
+    X,
+    Y,
+    sight,
+    to_world,
+)
+from contourslam.kernels import kernel
+from contourslam.landmarks import find_landmarks
+from contourslam.landmarks.detect import Lap
+from contourslam.scan import LaserScan
+from contourslam.slam import measurement
+from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.measurement import CORNER
+from contourslam.slam.visibility import expected_in_scan
+
+FREE = -1.0  # kind of a row of the table that holds nothing
+FORGET_AFTER = 15  # keyframes without another sighting after which a landmark in the making is given up
+# A landmark not seen from places known this sharply from here is not asked: its twin is found once the loop is closed.
+SHARP, SHARP_ANGLE = 0.10, math.radians(3.0)
+MARGIN = 3.0  # m by which landmarks may have moved since they were read
+# What iSAM2 gets while the drive goes on: every so many keyframes the newest sighting of each landmark, and only for a
+# while after its birth. A landmark that ties distant parts of the drive together makes each further step of iSAM2 several
+# times dearer and the poses no better, for contours tie those parts already; all sightings go into the refinement.
+BATCH, WINDOW = 10, 30
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """What one keyframe did to the landmarks; the fields are those of :class:`contourslam.slam.result.ScanUpdate`."""
+
+    corners: int
+    walls: int
+    matched: tuple[int, ...]
+    missed: tuple[int, ...]
+    born: tuple[int, ...]
+    dropped: tuple[int, ...]
+
+
+NOTHING = Count(0, 0, (), (), (), ())
+
+
+@kernel
+def _refresh(seen: Floats, landmark: Floats, observed: int) -> None:
+    """Let a sighting update what the graph does not estimate: a corner's looks, the extents."""
+    if seen[KIND] == CORNER:
+        landmark[OPENING] += (seen[OPENING] - landmark[OPENING]) / min(observed + 1.0, 20.0)
+        landmark[START], landmark[END] = max(seen[START], landmark[START]), max(seen[END], landmark[END])
+        return
+    tx, ty = -math.sin(landmark[DIRECTION]), math.cos(landmark[DIRECTION])
+    along = tx * (seen[X] - landmark[X]) + ty * (seen[Y] - landmark[Y])
+    landmark[START] = min(landmark[START], along + seen[START])
+    landmark[END] = max(landmark[END], along + seen[END])
+
+
+@kernel
+def _for_visibility(table: Floats, rows: Ints) -> tuple[Floats, Floats]:
+    """These landmarks as :func:`expected_in_scan` takes them."""
+    mean, out = np.zeros(3 + 2 * rows.size), np.zeros((rows.size, measurement.COLUMNS))
+    for k in range(rows.size):
+        row = table[rows[k]]
+        out[k, measurement.KIND], out[k, measurement.DIRECTION] = row[KIND], row[DIRECTION]
+        out[k, measurement.OPENING], out[k, measurement.CONVEX] = row[OPENING], row[CONVEX]
+        out[k, measurement.START], out[k, measurement.END] = row[START], row[END]
+        if row[KIND] == CORNER:
+            mean[3 + 2 * k], mean[4 + 2 * k] = row[X], row[Y]
+        else:
+            mean[3 + 2 * k] = row[DIRECTION]
+            out[k, measurement.ANCHOR_X], out[k, measurement.ANCHOR_Y] = row[X], row[Y]
+    return mean, out
+
+
+class Landmarks:
+    """Corners and walls of the graph, and those in the making; changed in place by every keyframe.
+
+    Parameters
+    ----------
+    config : Config
+    detector : Detector
+    mount : ndarray, shape (3,)
+        ``T_base_lidar``.
+    doubt : DoubtTree
+
+    Attributes
+    ----------
+    sightings : Sightings
+        Everything that the keyframes saw.
+    nodes : list of int
+        Node of each keyframe in the tree of doubt.
+    """
+
+    def __init__(self, config: Config, detector: Detector, mount: Floats, doubt: DoubtTree) -> None:
+        self._config, self._detector, self._mount, self._doubt = config, detector, mount, doubt
+        self.sightings = Sightings()
+        self.nodes: list[int] = []
+        self._poses: list[Floats] = []
+        self.table = np.full((64, COLUMNS), FREE)
+        # Of each row of the table: id (-1 in the making), sightings, misses, last keyframe that saw it, its node, and the
+        # keyframe from which on iSAM2 gets no more of it.
+        self._ids, self._observed, self._failed, self._last, self._node = (np.full(64, -1) for _ in range(5))
+        self._until = np.full(64, -1)
+        self._stale = np.zeros(64, np.bool_)  # moved in the graph since it was read
+        self._used = 0
+        self._making: dict[int, list[int]] = {}  # rows in the making, with the sightings so far
+        self._waiting: list[tuple[int, int]] = []  # sightings that are to enter the graph, with their landmark's row
+        self._in_graph: set[int] = set()
+        self.failures: list[int] = []  # by id
+        self._mapped: tuple[Floats, tuple[CornerMap, WallMap]] | None = None
+
+    def take(
+        self, scan: LaserScan, contours: Contours, key: int, pose: Floats, node: int, graph: PoseGraph, lap: Lap
+    ) -> Count:
+        """Take in what a keyframe saw; what is new in the graph is solved for at its next update.
+
+        Parameters
+        ----------
+        scan : LaserScan
+        contours : Contours
+            Of the scan, in the lidar's frame.
+        key : int
+            Number of the keyframe.
+        pose : ndarray, shape (3,)
+            In the world.
+        node : int
+            Of the keyframe in the tree of doubt.
+        graph : PoseGraph
+            In which the keyframe is already.
+        lap : callable
+            Called with the name of each stage when it is done.
+
+        Returns
+        -------
+        Count
+        """
+        found = find_landmarks(contours, self._detector, self._config, lap)
+        rows = sight(found.corners, found.walls, self._mount)
+        self.nodes.append(node)
+        self._poses.append(pose)
+        first = self.sightings.append(key, rows)
+        world = to_world(rows, np.zeros(len(rows), np.int64), pose[None])
+        around = near(self.table, self._used, pose[0], pose[1], self._config.lidar.max_range + MARGIN)
+        self._read(around[self._stale[around]], graph)
+        live = around[self._sharp(around, node, pose)]
+        chosen = associate(world, self.table, live, WIDE_GATES)
+        matched, born = self._recognise(world, chosen, first, key, node)
+        missed = self._count_missed(scan, pose, live, key)
+        lap("association")
+        dropped = self._drop(live, key)
+        if key % BATCH == 0:
+            self._bind(graph)
+        lap("landmarks")
+        return Count(len(found.corners), len(found.walls), matched, missed, born, dropped)
+
+    def maps(self, poses: Floats) -> tuple[CornerMap, WallMap]:
+        """Sort everything seen so far into a map.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (k, 3)
+            All keyframes in the world, as they are known now.
+
+        Returns
+        -------
+        CornerMap
+        WallMap
+            The covariances are those of each landmark's fit and, from the tree of doubt, of the first keyframe that saw
+            it: on the safe side after loops.
+        """
+        if self._mapped is None or not np.array_equal(self._mapped[0], poses):
+            n, found = self.sightings.count, find_landmark_set(self.sightings, poses)
+            ids, failed = records(found, self.sightings.ids[:n], self.failures)
+            kept = judge(found, failed, self._config.slam)
+            found, at = found.only(kept), poses[found.first[kept]]
+            known = [self._doubt.from_start(self.nodes[k], at[i]) for i, k in enumerate(found.first.tolist())]
+            spreads = np.array(known).reshape(-1, 3, 3)
+            self._mapped = poses.copy(), to_maps(found, ids[kept], failed[kept], at, spreads)
+        return self._mapped[1]
+
+    def refresh(self) -> None:
+        """Say that much of the graph has moved: each landmark is read anew from it when it is next come by."""
+        self._stale[:] = True
+
+    def _read(self, rows: Ints, graph: PoseGraph) -> None:
+        """Take over where the graph has these landmarks."""
+        self._stale[rows] = False
+        for j in rows.tolist():
+            number = int(self._ids[j])
+            if number in self._in_graph:
+                self.table[j, X : DIRECTION + 1] = graph.pose(LANDMARK + number)
+
+    def _sharp(self, rows: Ints, node: int, pose: Floats) -> NDArray[np.bool_]:
+        """Which rows were last seen from places that are known sharply from here."""
+        nodes, which = np.unique(self._node[rows], return_inverse=True)
+        doubt = self._doubt.between(node, nodes, pose)
+        sharp = (doubt[:, 0, 0] + doubt[:, 1, 1] < SHARP**2) & (doubt[:, 2, 2] < SHARP_ANGLE**2)
+        return np.asarray(sharp[which])
+
+    def _recognise(
+        self, world: Floats, chosen: Ints, first: int, key: int, node: int
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Book the sightings; returns the ids of landmarks matched and born."""
+        matched: list[int] = []
+        born: list[int] = []
+        for i, j in enumerate(chosen.tolist()):
+            if j == NONE:
+                row = self._begin(world[i])
+                self._making[row] = [first + i]
+                self._last[row], self._node[row] = key, node
+                continue
+            if j < 0:
+                continue
+            again = self._last[j] == key  # another piece of one wall
+            self._last[j], self._node[j] = key, node
+            if j in self._making:
+                self._making[j].append(first + i)
+                self._observed[j] += not again
+                self.table[j] = world[i]
+                if self._observed[j] >= self._config.slam.sightings_to_birth:
+                    born.append(self._bear(j))
+                continue
+            self._observed[j] += not again
+            _refresh(world[i], self.table[j], self._observed[j])
+            self.sightings.ids[first + i] = self._ids[j]
+            if key < self._until[j]:
+                self._waiting.append((first + i, j))
+            if not again:
+                matched.append(int(self._ids[j]))
+        return tuple(matched), tuple(born)
+
+    def _begin(self, row: Floats) -> int:
+        """Give a sighting a row of the table as a landmark in the making."""
+        free = np.flatnonzero(self.table[: self._used, KIND] < 0.0)
+        j = int(free[0]) if len(free) else self._used
+        if j == len(self.table):
+            self.table = np.concatenate([self.table, np.full_like(self.table, FREE)])
+            for name in ("_ids", "_observed", "_failed", "_last", "_node", "_until"):
+                setattr(self, name, np.concatenate([getattr(self, name), np.full(j, -1)]))
+            self._stale = np.concatenate([self._stale, np.zeros(j, np.bool_)])
+        self._used = max(self._used, j + 1)
+        self.table[j], self._ids[j], self._observed[j], self._failed[j] = row, -1, 1, 0
+        return j
+
+    def _bear(self, j: int) -> int:
+        """Let a landmark in the making enter the map with all its sightings; returns its id."""
+        number = len(self.failures)
+        self.failures.append(0)
+        self._ids[j], self._until[j] = number, self._last[j] + WINDOW
+        for s in self._making.pop(j):
+            self.sightings.ids[s] = number
+            self._waiting.append((s, j))
+        return number
+
+    def _bind(self, graph: PoseGraph) -> None:
+        """Add the waiting sightings to the graph, after reading where it has the landmarks."""
+        newest = {j: s for s, j in self._waiting if self._ids[j] == self.sightings.ids[s]}  # else j holds another now
+        self._waiting = []
+        if not newest:
+            return
+        rows, which = np.array(list(newest)), np.array(list(newest.values()))
+        self._read(rows, graph)
+        seen, keys, numbers = self.sightings.rows[which].astype(np.float64), self.sightings.keys[which], self._ids[rows]
+        world = to_world(seen, np.arange(len(seen)), np.array([self._poses[k] for k in keys]))
+        fresh = np.array([number not in self._in_graph for number in numbers.tolist()])
+        self._in_graph.update(numbers.tolist())
+        bind(graph, seen, world, keys, numbers, self.table[rows], fresh)
+
+    def _count_missed(self, scan: LaserScan, pose: Floats, live: Ints, key: int) -> tuple[int, ...]:
+        """Count a miss for each landmark that the scan should have shown; returns their ids."""
+        rows = live[(self._ids[live] >= 0) & (self._last[live] != key)]
+        angles, ranges = scan.angles, scan.ranges
+        if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
+            way = np.argsort(angles, kind="stable")
+            angles, ranges = angles[way], ranges[way]
+        least = self._config.landmarks
+        mean, table = _for_visibility(self.table, rows)
+        should = expected_in_scan(
+            mean, table, len(rows), compose_one(pose, self._mount), angles, ranges,
+            min(self._config.lidar.max_range, scan.range_max), least.min_side, least.min_side_points, least.min_wall,
+            least.min_wall_points,
+        )  # fmt: skip
+        missed = rows[should]
+        self._failed[missed] += 1
+        ids: list[int] = self._ids[missed].tolist()
+        for number in ids:
+            self.failures[number] += 1
+        return tuple(ids)
+
+    def _drop(self, live: Ints, key: int) -> tuple[int, ...]:
+        """Give up what is no landmark; its sightings stay for the final map to judge. Returns the ids."""
+        config = self._config.slam
+        chances = self._observed[live] + self._failed[live]
+        rate = self._failed[live] / np.maximum(chances, 1)
+        poor = live[(self._ids[live] >= 0) & (chances >= config.min_chances) & (rate > config.max_false_negative_rate)]
+        self.table[poor, KIND] = FREE
+        for j in [j for j in self._making if self._last[j] <= key - FORGET_AFTER]:
+            del self._making[j]
+            self.table[j, KIND] = FREE
+        return tuple(self._ids[poor].tolist())

@@ -1,0 +1,85 @@
+"""The whole map at the end of a drive: every keyframe held against the places around it once more, and all solved."""
+
+import gtsam
+import numpy as np
+
+from contourslam.contour.contours import Floats, Ints
+from contourslam.geometry.poses import between_one
+from contourslam.graph.matches import ROBUST_TIES, match_information
+from contourslam.graph.places import Keyframe, Places
+from contourslam.graph.pose_graph import PoseGraph, poses_of, relation, solve
+from contourslam.matching.align import align
+
+REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
+MOST_TIES = 3  # places a keyframe is held against
+APART = 3  # places before and after a keyframe's own that are not: their contours made its pose in the first place
+ROUNDS = 1
+LEAST_OVERLAP = 0.6
+# What the solution so far is taken to know, and how far a tie may contradict it: m, m, rad.
+SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
+PRIOR = np.diag(1.0 / SIGMA**2)
+
+
+def refine(graph: PoseGraph, keyframes: list[Keyframe], places: Places) -> gtsam.Values:
+    """Solve the graph at once, tie every keyframe anew to the places around it, and solve again.
+
+    Parameters
+    ----------
+    graph : PoseGraph
+        Stays as it is.
+    keyframes : list of Keyframe
+    places : Places
+        Are moved to where they come to lie.
+
+    Returns
+    -------
+    gtsam.Values
+        Of all variables.
+    """
+    values = solve(_joined(graph.factors, graph.ties), graph.estimate())
+    for _ in range(ROUNDS):
+        poses = poses_of(values, len(keyframes))
+        places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
+        values = solve(_joined(graph.factors, _ties(keyframes, poses, places)), values)
+    return values
+
+
+def _joined(*graphs: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
+    joined = gtsam.NonlinearFactorGraph()
+    for graph in graphs:
+        joined.push_back(graph)
+    return joined
+
+
+def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.NonlinearFactorGraph:
+    """Ties of all keyframes to the nearest places of other passes, place by place: each one's table is made once."""
+    ties = gtsam.NonlinearFactorGraph()
+    chosen = _pairs(poses, places)
+    for number in np.unique(chosen[:, 1]).tolist():
+        cells, anchor = places.cells(number), places.list[number].anchor
+        for key in chosen[chosen[:, 1] == number, 0].tolist():
+            guess = places.into(number, poses[key])
+            found = align(keyframes[key].oriented, cells, guess, PRIOR)
+            off = np.abs(between_one(guess, found.pose))
+            if found.overlap >= LEAST_OVERLAP and (off < FARTHEST).all():
+                information = match_information(found.information, found.pose[2])
+                ties.push_back(relation(anchor, key, found.pose, information, ROBUST_TIES))
+    return ties
+
+
+def _pairs(poses: Floats, places: Places) -> Ints:
+    """Keyframe and place of each tie to be tried, shape (n, 2)."""
+    own = np.zeros(len(poses), np.int64)
+    for number, place in enumerate(places.list):
+        own[place.anchor :] = number
+    rows = []
+    for number in range(len(places)):
+        distance = np.hypot(*(poses[:, :2] - places.centre(number)[:2]).T)
+        keys = np.flatnonzero((distance < REACH) & (np.abs(own - number) > APART))
+        rows.append(np.column_stack([keys, np.full(len(keys), number), distance[keys]]))
+    if not rows:
+        return np.empty((0, 2), np.int64)
+    every = np.concatenate(rows)
+    every = every[np.lexsort((every[:, 2], every[:, 0]))]
+    first = np.searchsorted(every[:, 0], every[:, 0])
+    return every[np.arange(len(every)) - first < MOST_TIES, :2].astype(np.int64)
