@@ -7,8 +7,6 @@ import numpy as np
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.angles import wrap_angle
 from contourslam.graph.sightings import (
-    COLUMNS,
-    CONVEX,
     DIRECTION,
     END,
     KIND,

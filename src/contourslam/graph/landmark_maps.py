@@ -54,7 +54,7 @@ def judge(found: LandmarkSet, failed: Ints, config: SlamConfig) -> NDArray[np.bo
 
 
 def _world_covariances(table: Floats, poses: Floats, spreads: Floats) -> Floats:
-    """Covariance of each landmark's x, y, direction in the world: its keyframe's, and its own fit's, shape (m, 3, 3)."""
+    """Covariance of each landmark's x, y and direction in the world: its keyframe's and its fit's, shape (m, 3, 3)."""
     m = len(table)
     lever = np.tile(np.eye(3), (m, 1, 1))
     lever[:, 0, 2], lever[:, 1, 2] = poses[:, 1] - table[:, Y], table[:, X] - poses[:, 0]

@@ -45,7 +45,7 @@ FORGET_AFTER = 15  # keyframes without another sighting after which a landmark i
 SHARP, SHARP_ANGLE = 0.10, math.radians(3.0)
 MARGIN = 3.0  # m by which landmarks may have moved since they were read
 # What iSAM2 gets while the drive goes on: every so many keyframes the newest sighting of each landmark, and only for a
-# while after its birth. A landmark that ties distant parts of the drive together makes each further step of iSAM2 several
+# while after its birth. Landmarks that tie distant parts of the drive together make each further step of iSAM2 several
 # times dearer and the poses no better, for contours tie those parts already; all sightings go into the refinement.
 BATCH, WINDOW = 10, 30
 
@@ -120,8 +120,8 @@ class Landmarks:
         self.nodes: list[int] = []
         self._poses: list[Floats] = []
         self.table = np.full((64, COLUMNS), FREE)
-        # Of each row of the table: id (-1 in the making), sightings, misses, last keyframe that saw it, its node, and the
-        # keyframe from which on iSAM2 gets no more of it.
+        # Of each row of the table: id (-1 in the making), sightings, misses, last keyframe that saw it, its node, and
+        # the keyframe from which on iSAM2 gets no more of it.
         self._ids, self._observed, self._failed, self._last, self._node = (np.full(64, -1) for _ in range(5))
         self._until = np.full(64, -1)
         self._stale = np.zeros(64, np.bool_)  # moved in the graph since it was read

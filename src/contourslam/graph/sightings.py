@@ -3,16 +3,17 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from contourslam.contour.contours import Floats, Ints
+from contourslam.contour.contours import Floats
 from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import compose_one
 from contourslam.kernels import kernel
 from contourslam.landmarks import Corners, Walls
 from contourslam.slam.measurement import CORNER, WALL
 
-# Columns of a sighting, and of a landmark. X, Y: a corner's position, a wall's middle. DIRECTION: a corner's bisector, a
-# wall's normal. START, END: a corner's sides at DIRECTION -+ OPENING / 2, a wall's ends along its tangent from X, Y.
+# Columns of a sighting, and of a landmark. X, Y: a corner's position, a wall's middle. DIRECTION: a corner's bisector,
+# a wall's normal. START, END: a corner's sides at DIRECTION -+ OPENING / 2, a wall's ends along its tangent from X, Y.
 # PXX ... PTT: covariance in the landmark's own frame, x along DIRECTION; of a wall x is across its line, and y is open.
 KIND, X, Y, DIRECTION, OPENING, CONVEX, START, END, PXX, PXY, PYY, PXT, PTT = range(13)
 COLUMNS = 13
@@ -29,7 +30,7 @@ SIDE_SIGMA, CORNER_ANGLE_FLOOR = 0.02, math.radians(1.5)
 
 @kernel
 def _sight(
-    positions: Floats, covariances: Floats, directions: Floats, openings: Floats, convex: np.ndarray, sides: Floats,
+    positions: Floats, covariances: Floats, directions: Floats, openings: Floats, convex: NDArray[np.bool_], sides: Floats,
     end_points: Floats, lines: Floats, line_covariances: Floats, mount: Floats,
 ) -> Floats:  # fmt: skip
     k, w = positions.shape[0], lines.shape[0]
@@ -90,7 +91,7 @@ def sight(corners: Corners, walls: Walls, mount: Floats) -> Floats:
 
 
 @kernel
-def to_world(rows: Floats, keys: Ints, poses: Floats) -> Floats:
+def to_world(rows: NDArray[np.floating], keys: NDArray[np.integer], poses: Floats) -> Floats:
     """Rows seen from the keyframes `keys`, in the frame in which `poses` gives all keyframes; a copy in float64."""
     out = rows.astype(np.float64)
     for i in range(rows.shape[0]):
