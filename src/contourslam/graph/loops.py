@@ -27,7 +27,8 @@ LEAST_OVERLAP = 0.65
 # The search: window, points of the patch, how good the best must be, and how much better than the next.
 WINDOW = np.array([8.0, 8.0, math.radians(25.0)])
 PATCH_POINTS, PATCH_RADIUS = 250, 15.0  # m around the robot
-LEAST_SCORE, MOST_RIVAL = 0.5, 0.85
+LEAST_SCORE, MOST_RIVAL = 0.33, 0.85
+LEAST_PATCH_OVERLAP = 0.45
 MOST_PLACES = 2  # places looked at in one search
 AGREE, AGREE_ANGLE = 0.3, math.radians(3.0)  # two looks that put the robot this close together agree,
 BETWEEN_LOOKS = 2.5  # if they lie this far apart, m: a look from where the first was taken says nothing new
@@ -211,6 +212,6 @@ class LoopFinder:
         cells = CellMap(guess, reach)
         cells.insert(known, np.zeros(3))
         aligned = align(points, cells, results[0].pose, FREE)
-        if aligned.overlap < LEAST_OVERLAP:
+        if aligned.overlap < LEAST_PATCH_OVERLAP:
             return None
         return Tie(number, aligned, between_one(guess, aligned.pose), "search", rival)

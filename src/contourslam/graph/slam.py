@@ -150,6 +150,7 @@ class GraphSlam:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
+        self._graph.update()  # what the last keyframe added
         values = self._graph.estimate()
         if self.config.graph.refine:
             values = refine(self._graph, self._keyframes, self._places)
