@@ -2,17 +2,19 @@
 
 import math
 
+import gtsam
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.graph.pose_graph import PoseGraph
-from contourslam.graph.sightings import DIRECTION, KIND, PTT, PXT, PXX, PXY, PYY, X, Y
+from contourslam.graph.landmark_set import LandmarkSet
+from contourslam.graph.pose_graph import PoseGraph, relation
+from contourslam.graph.sightings import DIRECTION, KIND, PTT, PXT, PXX, PXY, PYY, Sightings, X, Y, to_world
 from contourslam.kernels import kernel
 from contourslam.slam.measurement import CORNER
 
 LANDMARK = 1 << 40  # landmark i is variable LANDMARK + i, above all keyframes
 ROBUST = 2.0  # width of the Cauchy kernel, in standard deviations
-ALONG = 1.0  # m: how loosely a wall's point is held along its line, by the keyframe that saw it first
+LOOSE = np.diag([0.0, 1.0 / 1.0**2, 0.0])  # a wall's point is held along its line within 1 m by one keyframe
 
 
 @kernel
@@ -55,6 +57,15 @@ def measured(seen: Floats, world: Floats, landmark: Floats) -> tuple[Floats, Flo
     return pose, information
 
 
+@kernel
+def measured_all(seen: Floats, world: Floats, landmarks: Floats) -> tuple[Floats, Floats]:
+    """:func:`measured` for n rows: shapes (n, 3) and (n, 3, 3)."""
+    poses, information = np.empty((seen.shape[0], 3)), np.empty((seen.shape[0], 3, 3))
+    for i in range(seen.shape[0]):
+        poses[i], information[i] = measured(seen[i], world[i], landmarks[i])
+    return poses, information
+
+
 def bind(graph: PoseGraph, rows: Floats, world: Floats, keys: Ints, numbers: Ints, table: Floats, fresh: Ints) -> None:
     """Add landmarks and their sightings to a graph.
 
@@ -76,5 +87,39 @@ def bind(graph: PoseGraph, rows: Floats, world: Floats, keys: Ints, numbers: Int
         if fresh[i]:
             graph.add(variable, table[i, [X, Y, DIRECTION]])
             if rows[i, KIND] != CORNER:
-                graph.relate(key, variable, pose, np.diag([0.0, 1.0 / ALONG**2, 0.0]))
-        graph.relate(key, variable, pose, information, ROBUST)
+                graph.sight(key, variable, pose, LOOSE)
+        graph.sight(key, variable, pose, information, ROBUST)
+
+
+def relations(
+    found: LandmarkSet, sightings: Sightings, poses: Floats
+) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """Factors and starting values that put a whole set of landmarks into a graph solved at once.
+
+    Parameters
+    ----------
+    found : LandmarkSet
+    sightings : Sightings
+        From which it was made.
+    poses : ndarray, shape (k, 3)
+        All keyframes in the world, at which it was made.
+
+    Returns
+    -------
+    factors : gtsam.NonlinearFactorGraph
+    values : gtsam.Values
+        Of the landmarks; landmark i of the set is variable ``LANDMARK + i``.
+    """
+    factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    which = np.flatnonzero(found.labels >= 0)
+    keys, labels = sightings.keys[which], found.labels[which]
+    rows = sightings.rows[which].astype(np.float64)
+    seen, information = measured_all(rows, to_world(rows, keys, poses), found.table[labels])
+    for i, (key, label) in enumerate(zip(keys.tolist(), labels.tolist(), strict=True)):
+        variable = LANDMARK + label
+        factors.push_back(relation(key, variable, seen[i], information[i], ROBUST))
+        if key == found.first[label] and not values.exists(variable):
+            values.insert(variable, gtsam.Pose2(*found.table[label, X : DIRECTION + 1]))
+            if rows[i, KIND] != CORNER:
+                factors.push_back(relation(key, variable, seen[i], LOOSE))
+    return factors, values

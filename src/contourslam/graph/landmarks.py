@@ -1,6 +1,7 @@
 """Corners and walls while the drive goes on: seen, recognised, born into the graph, counted, dropped."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -176,29 +177,36 @@ class Landmarks:
         lap("landmarks")
         return Count(len(found.corners), len(found.walls), matched, missed, born, dropped)
 
-    def maps(self, poses: Floats) -> tuple[CornerMap, WallMap]:
+    def maps(self, poses: Floats, spreads: Callable[[Ints], Floats] | None = None) -> tuple[CornerMap, WallMap]:
         """Sort everything seen so far into a map.
 
         Parameters
         ----------
         poses : ndarray, shape (k, 3)
             All keyframes in the world, as they are known now.
+        spreads : callable, optional
+            Gives the covariances of keyframes in the world, shape (n, 3, 3), by their numbers; without it the tree of
+            doubt does, which is on the safe side after loops.
 
         Returns
         -------
         CornerMap
         WallMap
-            The covariances are those of each landmark's fit and, from the tree of doubt, of the first keyframe that saw
-            it: on the safe side after loops.
+            The covariances are those of each landmark's fit and of the first keyframe that saw it.
         """
         if self._mapped is None or not np.array_equal(self._mapped[0], poses):
             n, found = self.sightings.count, find_landmark_set(self.sightings, poses)
             ids, failed = records(found, self.sightings.ids[:n], self.failures)
             kept = judge(found, failed, self._config.slam)
             found, at = found.only(kept), poses[found.first[kept]]
-            known = [self._doubt.from_start(self.nodes[k], at[i]) for i, k in enumerate(found.first.tolist())]
-            spreads = np.array(known).reshape(-1, 3, 3)
-            self._mapped = poses.copy(), to_maps(found, ids[kept], failed[kept], at, spreads)
+            if spreads is None:
+                known = np.array(
+                    [self._doubt.from_start(self.nodes[k], p) for k, p in zip(found.first, at, strict=True)]
+                )
+            else:
+                keys, which = np.unique(found.first, return_inverse=True)
+                known = spreads(keys)[which]
+            self._mapped = poses.copy(), to_maps(found, ids[kept], failed[kept], at, known.reshape(-1, 3, 3))
         return self._mapped[1]
 
     def refresh(self) -> None:

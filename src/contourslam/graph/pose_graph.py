@@ -5,8 +5,9 @@ import math
 import gtsam
 import numpy as np
 
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Floats, Ints
 from contourslam.kernels import kernel
+from contourslam.matching.small import turned
 
 # Variables are all Pose2: keyframes, corners (position and direction of the bisector), walls (a point and the normal).
 Robust = float | None  # width of a Cauchy kernel in standard deviations
@@ -50,7 +51,8 @@ class PoseGraph:
     Attributes
     ----------
     factors, ties : gtsam.NonlinearFactorGraph
-        All factors so far; the ties of keyframes to places seen before are kept apart, for they can be had anew.
+        All factors so far but those of landmarks; the ties of keyframes to places seen before are kept apart. Ties and
+        landmarks can be had anew.
     """
 
     def __init__(self) -> None:
@@ -77,6 +79,10 @@ class PoseGraph:
         """Say where `second` lies, seen from `first`; `information` is in the frame of `second`."""
         self._put(relation(first, second, pose, information, robust), self.ties if tie else self.factors)
 
+    def sight(self, key: int, variable: int, pose: Floats, information: Floats, robust: Robust = None) -> None:
+        """As :meth:`relate`, of a landmark: iSAM2 gets it, and it is not kept."""
+        self._new.push_back(relation(key, variable, pose, information, robust))
+
     def _put(self, factor: gtsam.NonlinearFactor, kept: gtsam.NonlinearFactorGraph) -> None:
         self._new.push_back(factor)
         kept.push_back(factor)
@@ -93,9 +99,9 @@ class PoseGraph:
         """Estimate of one variable."""
         return to_array(self._isam.calculateEstimatePose2(key))
 
-    def estimate(self) -> gtsam.Values:
-        """Estimate of all variables."""
-        return self._isam.calculateEstimate()
+    def estimate(self, count: int) -> gtsam.Values:
+        """Estimate of the keyframes 0 to `count` - 1."""
+        return keyframes_of(self._isam.calculateEstimate(), count)
 
 
 def relation(
@@ -111,6 +117,29 @@ def solve(factors: gtsam.NonlinearFactorGraph, start: gtsam.Values) -> gtsam.Val
     parameters.setMaxIterations(30)
     parameters.setRelativeErrorTol(1e-5)
     return gtsam.LevenbergMarquardtOptimizer(factors, start, parameters).optimize()
+
+
+def joined(*graphs: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
+    """All factors of several graphs."""
+    every = gtsam.NonlinearFactorGraph()
+    for graph in graphs:
+        every.push_back(graph)
+    return every
+
+
+def spreads(factors: gtsam.NonlinearFactorGraph, values: gtsam.Values, keys: Ints) -> Floats:
+    """Marginal covariances of poses, in the world's axes, shape (n, 3, 3)."""
+    marginals = gtsam.Marginals(factors, values)
+    out = [turned(marginals.marginalCovariance(key), values.atPose2(key).theta()) for key in keys.tolist()]
+    return np.array(out).reshape(-1, 3, 3)
+
+
+def keyframes_of(values: gtsam.Values, count: int) -> gtsam.Values:
+    """Those of the keyframes 0 to `count` - 1."""
+    out = gtsam.Values()
+    for key in range(count):
+        out.insert(key, values.atPose2(key))
+    return out
 
 
 def poses_of(values: gtsam.Values, count: int) -> Floats:

@@ -5,9 +5,12 @@ import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between_one
+from contourslam.graph.landmark_factors import relations
+from contourslam.graph.landmark_set import find_landmark_set
 from contourslam.graph.matches import ROBUST_TIES, match_information
 from contourslam.graph.places import Keyframe, Places
-from contourslam.graph.pose_graph import PoseGraph, poses_of, relation, solve
+from contourslam.graph.pose_graph import PoseGraph, joined, keyframes_of, poses_of, relation, solve
+from contourslam.graph.sightings import Sightings
 from contourslam.matching.align import align
 
 REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
@@ -20,8 +23,10 @@ SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
 PRIOR = np.diag(1.0 / SIGMA**2)
 
 
-def refine(graph: PoseGraph, keyframes: list[Keyframe], places: Places) -> gtsam.Values:
-    """Solve the graph at once, tie every keyframe anew to the places around it, and solve again.
+def refine(
+    graph: PoseGraph, keyframes: list[Keyframe], places: Places, sightings: Sightings
+) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """Solve the graph at once, tie every keyframe anew to the places around it and to all landmarks, and solve again.
 
     Parameters
     ----------
@@ -30,25 +35,28 @@ def refine(graph: PoseGraph, keyframes: list[Keyframe], places: Places) -> gtsam
     keyframes : list of Keyframe
     places : Places
         Are moved to where they come to lie.
+    sightings : Sightings
+        Of corners and walls.
 
     Returns
     -------
-    gtsam.Values
-        Of all variables.
+    factors : gtsam.NonlinearFactorGraph
+        Of all that was solved at last.
+    values : gtsam.Values
+        Of the keyframes and the landmarks.
     """
-    values = solve(_joined(graph.factors, graph.ties), graph.estimate())
+    count = len(keyframes)
+    factors = joined(graph.factors, graph.ties)
+    values = solve(factors, graph.estimate(count))
     for _ in range(ROUNDS):
-        poses = poses_of(values, len(keyframes))
+        poses = poses_of(values, count)
         places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
-        values = solve(_joined(graph.factors, _ties(keyframes, poses, places)), values)
-    return values
-
-
-def _joined(*graphs: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
-    joined = gtsam.NonlinearFactorGraph()
-    for graph in graphs:
-        joined.push_back(graph)
-    return joined
+        seen, landmarks = relations(find_landmark_set(sightings, poses), sightings, poses)
+        start = keyframes_of(values, count)
+        start.insert(landmarks)
+        factors = joined(graph.factors, _ties(keyframes, poses, places), seen)
+        values = solve(factors, start)
+    return factors, values
 
 
 def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.NonlinearFactorGraph:

@@ -30,8 +30,8 @@ SIDE_SIGMA, CORNER_ANGLE_FLOOR = 0.02, math.radians(1.5)
 
 @kernel
 def _sight(
-    positions: Floats, covariances: Floats, directions: Floats, openings: Floats, convex: NDArray[np.bool_], sides: Floats,
-    end_points: Floats, lines: Floats, line_covariances: Floats, mount: Floats,
+    positions: Floats, covariances: Floats, directions: Floats, openings: Floats, convex: NDArray[np.bool_],
+    sides: Floats, end_points: Floats, lines: Floats, line_covariances: Floats, mount: Floats,
 ) -> Floats:  # fmt: skip
     k, w = positions.shape[0], lines.shape[0]
     out = np.zeros((k + w, COLUMNS))

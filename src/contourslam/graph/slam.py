@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import gtsam
 import numpy as np
 
 from contourslam.config import Config
@@ -14,7 +15,7 @@ from contourslam.graph.landmarks import NOTHING, Landmarks
 from contourslam.graph.loops import LoopFinder, Tie
 from contourslam.graph.matches import ROBUST_TIES, match_information
 from contourslam.graph.places import Keyframe, Places
-from contourslam.graph.pose_graph import PoseGraph, poses_of
+from contourslam.graph.pose_graph import PoseGraph, poses_of, spreads
 from contourslam.graph.refine import refine
 from contourslam.landmarks import trace
 from contourslam.matching.odometry import LENGTH, ContourOdometry, Step
@@ -79,6 +80,7 @@ class GraphSlam:
         self._finder = LoopFinder(self._places, self._doubt)
         # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
         self._scans: list[tuple[int, Floats, Floats]] = []
+        self._settled: tuple[gtsam.NonlinearFactorGraph, gtsam.Values] | None = None  # the graph, refined
         self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
         self._ties: list[tuple[int, Tie]] = []
         self._nodes: dict[int, int] = {}
@@ -122,6 +124,7 @@ class GraphSlam:
         self._lap("matching")
         count = NOTHING
         if step.keyframe is not None:
+            self._settled = None
             self._add_keyframe(step.keyframe, step, Keyframe(scan.stamp, step.pose, oriented.astype(np.float32)))
             self._lap("graph")
             node = self._nodes[step.anchor]
@@ -137,23 +140,28 @@ class GraphSlam:
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
-        return self._landmarks.maps(self._key_poses())[0]
+        return self._map()[0]
 
     def wall_map(self) -> WallMap:
         """Walls of the map as they stand now."""
-        return self._landmarks.maps(self._key_poses())[1]
+        return self._map()[1]
 
-    def _key_poses(self) -> Floats:
-        return np.array([self._graph.pose(k) for k in range(len(self._keyframes))]).reshape(-1, 3)
+    def _map(self) -> tuple[CornerMap, WallMap]:
+        if self._settled is None:
+            return self._landmarks.maps(poses_of(self._graph.estimate(len(self._keyframes)), len(self._keyframes)))
+        factors, values = self._settled
+        poses = poses_of(values, len(self._keyframes))
+        return self._landmarks.maps(poses, lambda keys: spreads(factors, values, keys))
 
     def finish(self) -> Finished:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
         self._graph.update()  # what the last keyframe added
-        values = self._graph.estimate()
+        values = self._graph.estimate(len(self._keyframes))
         if self.config.graph.refine:
-            values = refine(self._graph, self._keyframes, self._places)
+            factors, values = refine(self._graph, self._keyframes, self._places, self._landmarks.sightings)
+            self._settled = factors, values
         poses = self._along(poses_of(values, len(self._keyframes)))
         return Finished(poses, np.array([c for _, _, c in self._scans]), self._loops())
 
