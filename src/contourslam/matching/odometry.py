@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contourslam.contour.contours import Floats
+from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.matching.align import Alignment, align
 from contourslam.matching.cell_map import CellMap
+from contourslam.matching.certainty import match_covariance
 from contourslam.matching.rescue import LOOSE, find_again
 from contourslam.matching.small import invert, moved
 
@@ -21,6 +23,7 @@ FLOOR = np.diag([0.003**2, 0.003**2, math.radians(0.1) ** 2])
 # The wheels' covariance counts for so much more beside the contours': a prior too tight pulls each step the same way,
 # and the heading drifts; one too loose costs next to nothing.
 LOOSER = 9.0
+LEARN = 0.01  # weight of the newest scan in what is known of the wheels
 POOR = 0.8  # an overlap below this part of the usual one says that the alignment may be wrong
 
 
@@ -39,6 +42,8 @@ class LocalMap:
         In the frame of the contour odometry.
     members : list of int
         Keyframes whose contours it holds.
+    first : ndarray, shape (n, 4)
+        Points and normals of the anchor's own scan.
     travelled : float
         Length of the stretch, m.
     """
@@ -47,12 +52,15 @@ class LocalMap:
         self.anchor, self.pose = anchor, pose
         self.covariance: Floats = FLOOR.copy()
         self.cells = CellMap(pose, half_width)
+        self.first: Floats = np.empty((0, 4))
         self.members: list[int] = []
         self.travelled = 0.0
 
     def insert(self, keyframe: int, oriented: Floats, pose: Floats, distance: float) -> None:
         """Take in the contours of a keyframe."""
         self.cells.insert(oriented, pose)
+        if not self.members:
+            self.first = oriented
         self.members.append(keyframe)
         self.travelled += distance
 
@@ -75,6 +83,8 @@ class Step:
         True where the alignment contradicts the increment.
     keyframe : int or None
         Number of the keyframe that the scan became.
+    match : ndarray, shape (3, 3), or None
+        Of a keyframe that was aligned: covariance of its pose as seen from the anchor, in its own frame.
     finished : LocalMap or None
         A local map that took in its last keyframe before this scan.
     """
@@ -86,6 +96,7 @@ class Step:
     quality: float
     slipped: bool
     keyframe: int | None
+    match: Floats | None
     finished: LocalMap | None
 
 
@@ -107,9 +118,11 @@ class ContourOdometry:
         self._last_key: Floats = np.zeros(3)
         self._usual = 0.0
         self._motion: Floats = np.zeros(3)  # between the last two scans
+        self._turns = np.zeros(2)  # squares of the wheels' errors of turning, and what they should be; running means
+        self._taught = 0.0
         self._trusted: Floats = np.zeros(3)  # where the wheels have it, from the last scan that agreed with them
 
-    def push(self, oriented: Floats, increment: Floats, noise: Floats) -> Step:
+    def push(self, oriented: Floats, increment: Floats, noise: Floats, exposure: float = 0.0) -> Step:
         """Align a scan.
 
         Parameters
@@ -120,11 +133,14 @@ class ContourOdometry:
             Motion since the last scan as the wheels, or a guess, have it, in the frame of the base then.
         noise : ndarray, shape (3, 3)
             Its covariance.
+        exposure : float
+            Part of it that blurs the scan, see :func:`contourslam.matching.certainty.exposure`.
 
         Returns
         -------
         Step
         """
+        turn_noise = float(noise[2, 2])
         share = min((math.hypot(increment[0], increment[1]) + abs(increment[2])) / 0.1, 1.0)
         before = self.pose
         noise = LOOSER * noise + share * FLOOR
@@ -137,17 +153,24 @@ class ContourOdometry:
         if active is not None and len(oriented) >= LEAST_POINTS:
             steady = compose_one(before, self._motion)
             found, quality, slipped = self._align(oriented, active, [self.pose, steady, self._trusted])
+        self._motion = between_one(before, self.pose)
         if not slipped:
             self._trusted = self.pose
-        self._motion = between_one(before, self.pose)
+            if found is not None:
+                # Contours know a scan's heading as it was on average over the scan: blur has been taken off the noise.
+                known = turn_noise * (1.0 - min(exposure, 1.0 / 3.0))
+                self._learn(wrap_angle(increment[2] - self._motion[2]) ** 2, known, share)
         anchor = 0 if active is None else active.anchor
         distance, turn = self._since_keyframe()
-        keyframe, finished = None, None
+        keyframe, match, finished = None, None, None
         if active is None or distance > KEY_DISTANCE or turn > KEY_TURN:
             keyframe = self.keyframes
+            if active is not None and found is not None:
+                blur = exposure * turn_noise * self.turn_excess
+                match = match_covariance(oriented, active.cells, self.pose, active.first, active.pose, blur)
             finished = self._keep(oriented, distance)
         about = active or self.newest
-        return Step(self.pose, about.covariance, found, anchor, quality, slipped, keyframe, finished)
+        return Step(self.pose, about.covariance, found, anchor, quality, slipped, keyframe, match, finished)
 
     def _align(self, oriented: Floats, active: LocalMap, expected: list[Floats]) -> tuple[Alignment, float, bool]:
         """Align where the wheels have the scan, and where that fits badly, elsewhere."""
@@ -164,6 +187,20 @@ class ContourOdometry:
                 before = LOOSE if slipped else invert(local.covariance)
                 local.covariance = invert(before + found.information)
         return found, quality, slipped
+
+    @property
+    def turn_excess(self) -> float:
+        """Variance of the wheels' turns as found, as a part of what was stated."""
+        return float(self._turns[0] / self._turns[1]) if self._turns[1] > 0.0 else 1.0
+
+    def _learn(self, square: float, expected: float, share: float) -> None:
+        """Hold the wheels' turns against those of the contours; a robot at rest teaches nothing."""
+        if self._turns[1] == 0.0:
+            self._turns[:] = expected
+        gain = share * max(1.0 / (self._taught + 2.0), LEARN)
+        self._taught += share
+        square = min(square, 16.0 * self.turn_excess * expected)  # a slip is none of the usual errors
+        self._turns += gain * (np.array([square, expected]) - self._turns)
 
     def _since_keyframe(self) -> tuple[float, float]:
         step = between_one(self._last_key, self.pose)
