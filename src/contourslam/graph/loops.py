@@ -1,6 +1,7 @@
 """Places seen again: tied where the pose is sure, searched for where it is not, believed when two looks agree."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ LEAST_SIGMA = np.array([0.05, 0.05, math.radians(1.0)])  # what the doubt is nev
 GATE = 16.0  # squared Mahalanobis distance by which a tie may shift the pose
 LEAST_OVERLAP = 0.65
 # The search: window, points of the patch, how good the best must be, and how much better than the next.
-WINDOW = np.array([8.0, 8.0, math.radians(25.0)])
+WINDOW = np.array([15.0, 15.0, math.radians(35.0)])
 PATCH_POINTS, PATCH_RADIUS = 250, 15.0  # m around the robot
 LEAST_SCORE, MOST_RIVAL = 0.33, 0.85
 LEAST_PATCH_OVERLAP = 0.45
@@ -98,6 +99,7 @@ class LoopFinder:
         self._places, self._doubt = places, doubt
         self._waiting: list[_Look] = []
         self._searched_at = -math.inf
+        self._looked: deque[int] = deque(maxlen=2 * MOST_PLACES)
         self.searches = 0
 
     def candidates(self, pose: Floats, node: int) -> tuple[Candidates, Candidates]:
@@ -176,8 +178,8 @@ class LoopFinder:
         points = move(patch.points[:, :4], inverse(local))
         points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
         looks = []
-        for number, doubt in zip(unsure.numbers[:MOST_PLACES], unsure.doubts, strict=False):
-            tie = self._find(int(number), points, pose, doubt)
+        for i in self._turn(unsure.numbers):
+            tie = self._find(int(unsure.numbers[i]), points, pose, unsure.doubts[i])
             if tie is None:
                 continue
             world = self._places.out_of(tie.place, tie.alignment.pose)
@@ -191,6 +193,18 @@ class LoopFinder:
             looks.append(look)
         self._waiting += looks
         return []
+
+    def _turn(self, numbers: Ints) -> list[int]:
+        """Which of the candidates are looked at now: those that were not of late, nearest first."""
+        recent = set(self._looked)
+        order = sorted(range(len(numbers)), key=lambda i: int(numbers[i]) in recent)
+        chosen: list[int] = []
+        for i in order:
+            # Neighbours are searched together.
+            if len(chosen) < MOST_PLACES and all(abs(int(numbers[i] - numbers[j])) > 1 for j in chosen):
+                chosen.append(i)
+        self._looked.extend(int(numbers[i]) for i in chosen)
+        return chosen
 
     def _find(self, number: int, points: Floats, pose: Floats, doubt: Floats) -> Tie | None:
         """Search one place, with its neighbours, for the patch; None where nothing fits, or two poses do."""
