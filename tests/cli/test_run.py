@@ -3,7 +3,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +12,19 @@ import pytest
 from ruamel.yaml import YAML
 
 from contourslam.cli import main
-from contourslam.recordings import read_trajectory
+from contourslam.recordings import Message, read_trajectory
+from contourslam.recordings.carmen import CarmenRecording
 from contourslam.report.result_folder import read_result_folder
 
 Failure = Callable[..., str]
+GRAPH = find_spec("gtsam") is not None
 FILES = {
     "trajectory.tum",
+    *(["trajectory_online.tum"] if GRAPH else []),
     "index.html",
     "map.geojson",
-    "map.pgm",
-    "map.yaml",
-    "map.png",
+    "map.svg",
+    "odometry.tum",
     "metrics.json",
     "config.yaml",
     "scans.csv",
@@ -58,16 +61,89 @@ def test_the_page_of_a_run_says_what_was_mapped(mapped: Path) -> None:
         assert absent not in page
 
 
-def test_the_map_of_a_known_room_is_right(mapped: Path) -> None:
-    result = read_result_folder(mapped).result
+@pytest.mark.parametrize("back_end", ["ekf", "graph"])
+def test_the_way_through_a_known_room_is_right(back_end: str, log: Path, tmp_path: Path) -> None:
+    if back_end == "graph" and not GRAPH:
+        pytest.skip("the graph needs GTSAM, the extra `graph`")
+    assert main(["run", str(log), "-o", str(tmp_path), "--back-end", back_end]) == 0
+    result = read_result_folder(tmp_path).result
     assert result.complete
+    assert result.back_end == back_end
+    turn = 0.05 * (len(result.stamps) - 1)
+    end = np.array([0.8 * np.sin(turn), 0.8 * (1.0 - np.cos(turn))])
+    assert np.linalg.norm(result.poses[-1, :2] - end) < 0.02
+
+
+def test_the_map_of_a_known_room_is_right(log: Path, tmp_path: Path) -> None:
+    assert main(["run", str(log), "-o", str(tmp_path), "--back-end", "ekf"]) == 0
+    result = read_result_folder(tmp_path).result
     start = np.array([2.0, 1.7])  # the run begins at zero
     for corner in ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0)):
         distances = np.linalg.norm(result.corner_map.positions + start - corner, axis=1)
         assert distances.min() < 0.02
-    turn = 0.05 * (len(result.stamps) - 1)
-    end = np.array([0.8 * np.sin(turn), 0.8 * (1.0 - np.cos(turn))])
-    assert np.linalg.norm(result.poses[-1, :2] - end) < 0.02
+
+
+def test_the_back_end_is_the_graph_where_gtsam_is_and_the_reason_is_said(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    best = "graph" if GRAPH else "ekf"
+    for options, back_end, reason in (([], best, "GTSAM is"), (["--back-end", "ekf"], "ekf", "asked" if GRAPH else "")):
+        out = tmp_path / f"out{len(options)}"
+        assert main(["run", str(log), "-o", str(out), "--max-scans", "5", *options]) == 0
+        said = capsys.readouterr().out
+        assert f"back end: {back_end} (" in said
+        assert reason in said
+        assert " loops, " in said.splitlines()[0]
+        metrics = json.loads((out / "metrics.json").read_text())
+        assert metrics["back_end"] == back_end
+        assert metrics["back_end_reason"] in said
+        assert metrics["back_end_reason"] in (out / "index.html").read_text()
+
+
+def test_without_gtsam_the_filter_runs_and_says_how_to_get_the_graph(log: Path, tmp_path: Path) -> None:
+    code = (
+        "import importlib.util as util, sys\n"
+        "find = util.find_spec\n"
+        "util.find_spec = lambda name, *more: None if name == 'gtsam' else find(name, *more)\n"
+        "sys.modules['gtsam'] = None\n"
+        "from contourslam.cli import main\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    arguments = [sys.executable, "-c", code, "run", str(log), "-o", str(tmp_path / "out"), "--max-scans", "5"]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "back end: ekf (GTSAM is not installed: `pip install 'contourslam[graph]'`" in done.stdout
+    settings = read_result_folder(tmp_path / "out").config.slam
+    assert (settings.walls, settings.contour_matching) == (True, True)
+
+
+def test_the_recording_is_read_once_unless_a_grid_is_wanted(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, passes = CarmenRecording.messages, []
+
+    def counted(recording: CarmenRecording) -> Iterator[Message]:
+        passes.append(recording)
+        yield from whole(recording)
+
+    monkeypatch.setattr(CarmenRecording, "messages", counted)
+    arguments = ["run", str(log), "-o", str(tmp_path), "--overwrite"]
+    for options, expected in (([], 1), (["--grid"], 3)):
+        assert main([*arguments, *options]) == 0
+        assert len(passes) == expected
+
+
+def test_online_and_refined_errors_are_said_beside_each_other(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if not GRAPH:
+        pytest.skip("the graph needs GTSAM, the extra `graph`")
+    relations = tmp_path / "truth.relations"
+    relations.write_text(f"100.0 110.0 {0.8 * np.sin(2.5)} {0.8 * (1 - np.cos(2.5))} 0 0 0 2.5\n")
+    assert main(["run", str(log), "-o", str(tmp_path / "out"), "--relations", str(relations)]) == 0
+    said = capsys.readouterr().out
+    assert "relation error, refined at the end: 0.0" in said
+    assert "as known at the time (online): 0.0" in said
 
 
 def test_the_configuration_a_run_wrote_gives_the_same_run(log: Path, mapped: Path, tmp_path: Path) -> None:
@@ -81,7 +157,7 @@ def test_the_configuration_a_run_wrote_gives_the_same_run(log: Path, mapped: Pat
 
 def test_an_option_beside_a_configuration_file_wins(log: Path, mapped: Path, tmp_path: Path) -> None:
     arguments = [f"--config={mapped / 'config.yaml'}", "--min-wall", "0.7", "-o", str(tmp_path / "out")]
-    assert main(["run", str(log), *arguments, "--max-scans", "3", "--no-grid"]) == 0
+    assert main(["run", str(log), *arguments, "--max-scans", "3"]) == 0
     old, new = (YAML(typ="safe").load(folder / "config.yaml") for folder in (mapped, tmp_path / "out"))
     assert new["landmarks"].pop("min_wall") == 0.7
     assert old["landmarks"].pop("min_wall") != 0.7
@@ -109,10 +185,10 @@ def test_a_folder_that_holds_something_is_refused(
 
 def test_overwriting_leaves_nothing_of_the_run_before(log: Path, tmp_path: Path) -> None:
     arguments = ["run", str(log), "-o", str(tmp_path), "--overwrite", "--max-scans", "5"]
+    assert main([*arguments, "--grid"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == FILES | {"map.pgm", "map.yaml"}
     assert main(arguments) == 0
-    assert (tmp_path / "map.pgm").exists()
-    assert main([*arguments, "--no-grid"]) == 0
-    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.pgm", "map.yaml"}
+    assert {path.name for path in tmp_path.iterdir()} == FILES
 
 
 def test_an_output_folder_that_cannot_be_made_is_a_known_failure(failure: Failure, log: Path, tmp_path: Path) -> None:
@@ -147,7 +223,6 @@ def test_a_truncated_log_keeps_the_map_of_what_came_before(failure: Failure, log
     assert 25 <= len(kept.result.stamps) <= 30
     assert not kept.result.complete
     assert any("cut short" in reason for reason in kept.result.skipped)
-    assert (tmp_path / "out" / "map.pgm").exists()
 
 
 @pytest.mark.parametrize("presses", [1, 2])
@@ -161,7 +236,6 @@ def test_ctrl_c_in_mid_run_keeps_what_is_done(presses: int, log: Path, tmp_path:
     kept = read_result_folder(out).result
     assert 15 <= len(kept.stamps) <= 20  # odometry and scan alternate in the log
     assert not kept.complete
-    assert (out / "map.pgm").exists()
 
 
 def test_a_full_disk_is_a_known_failure(
@@ -171,26 +245,24 @@ def test_a_full_disk_is_a_known_failure(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
-    said = failure("run", log, "-o", tmp_path / "out", "--max-scans", "3", "--no-grid")
+    said = failure("run", log, "-o", tmp_path / "out", "--max-scans", "3")
     assert "No space left on device" in said
 
 
-def test_without_the_report_extra_all_but_the_picture_and_the_page_is_written(
-    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    drawing = ("contourslam.report.figures", "contourslam.report.page.run")
-    for name in [name for name in sys.modules if name.startswith(drawing)]:
+def test_without_the_report_extra_all_is_written(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("contourslam.report")]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for name in ("matplotlib", "scipy.special", "evo"):
+        monkeypatch.setitem(sys.modules, name, None)
     assert main(["run", str(log), "-o", str(tmp_path), "--max-scans", "3"]) == 0
-    assert {path.name for path in tmp_path.iterdir()} == FILES - {"map.png", "index.html"}
-    assert "contourslam[report]" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == FILES
 
 
 def test_every_and_max_scans_thin_the_recording(log: Path, tmp_path: Path) -> None:
-    assert main(["run", str(log), "-o", str(tmp_path), "--every", "3", "--max-scans", "4", "--no-grid"]) == 0
+    assert main(["run", str(log), "-o", str(tmp_path), "--every", "3", "--max-scans", "4"]) == 0
+    assert read_result_folder(tmp_path).result.stamps.tolist() == pytest.approx([100.0, 100.6, 101.2, 101.8])
     stamps, _ = read_trajectory(tmp_path / "trajectory.tum")
-    assert stamps.tolist() == pytest.approx([100.0, 100.6, 101.2, 101.8])
+    assert stamps.tolist() == pytest.approx(np.arange(100.0, 101.9, 0.2).tolist())  # the wheels between them too
 
 
 def test_every_zero_is_refused(failure: Failure, log: Path, tmp_path: Path) -> None:
@@ -210,7 +282,8 @@ def test_relations_are_judged_beside_raw_odometry(
     assert metrics["relations"]["translation"]["mean"] < metrics["odometry_relations"]["translation"]["mean"]
     assert json.loads((tmp_path / "out" / "metrics.json").read_text())["relations"] == metrics["relations"]
     header, row = (tmp_path / "out" / "relation_errors.csv").read_text().splitlines()
-    assert header == "earlier_stamp,later_stamp,translation,rotation,odometry_translation,odometry_rotation"
+    online = "online_translation,online_rotation," if GRAPH else ""
+    assert header == f"earlier_stamp,later_stamp,translation,rotation,{online}odometry_translation,odometry_rotation"
     values = [float(value) for value in row.split(",")]
     assert values[:2] == [100.0, 110.0]
     assert values[2] == pytest.approx(metrics["relations"]["translation"]["mean"], rel=1e-4)
@@ -222,7 +295,7 @@ def test_relations_are_judged_beside_raw_odometry(
 def test_a_single_scan_is_not_judged_and_still_shown(log: Path, tmp_path: Path) -> None:
     relations = tmp_path / "truth.relations"
     relations.write_text("100.0 110.0 1 0 0 0 0 0\n")
-    arguments = ["--max-scans", "1", "--no-grid", "--relations", str(relations)]
+    arguments = ["--max-scans", "1", "--relations", str(relations)]
     assert main(["run", str(log), "-o", str(tmp_path / "out"), *arguments]) == 0
     assert "1 scan over" in (tmp_path / "out" / "index.html").read_text()
 

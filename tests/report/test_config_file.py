@@ -10,7 +10,7 @@ from contourslam.report.config_file import read_config, write_config
 def test_a_configuration_comes_back_as_it_was(tmp_path):
     motion = MotionConfig(forward_per_sqrt_m=0.123456789012345)
     config = Config(
-        "wu", lidar=LidarConfig(mount_x=0.1), slam=SlamConfig(walls=True, association="joint", motion=motion)
+        detector="wu", lidar=LidarConfig(mount_x=0.1), slam=SlamConfig(walls=True, association="joint", motion=motion)
     )
     write_config(tmp_path / "config.yaml", config, header="contourslam run a.mcap\n-o x")
     assert read_config(tmp_path / "config.yaml") == config

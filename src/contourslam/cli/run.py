@@ -175,13 +175,13 @@ def _run(options: Run, command: str) -> int:
         judged = None if relations is None or len(result.stamps) < 2 else judge(result, *relations)
         metrics = run_metrics(result, relations=judged) | {"back_end_reason": _reason(settings)}
         grid = _grid(recording, result, options) if options.grid else None
-        notes = write_result_folder(options.output, result, settings, metrics, grid=grid, command=command)
+        write_result_folder(options.output, result, settings, metrics, grid=grid, command=command)
         name = options.recording.name
-        notes += write_run_page(options.output, result, settings, metrics, judged, command=command, name=name)
+        write_run_page(options.output, result, settings, metrics, judged, command=command, name=name)
         if grid is None:  # an earlier run's would not belong to this one
             for name in ("map.pgm", "map.yaml"):
                 (options.output / name).unlink(missing_ok=True)
-        for text in (*recording.notes, *notes):
+        for text in recording.notes:
             note(text)
         _tell(options, metrics)
     if messages.error is not None:

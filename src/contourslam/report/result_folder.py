@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contourslam import __version__
 from contourslam.config import Config
-from contourslam.errors import MissingExtraError, RecordingError, ResultError
+from contourslam.errors import RecordingError, ResultError
 from contourslam.recordings.trajectories import read_trajectory, write_trajectory
 from contourslam.report.atomic import make_folder, remove, write_text
 from contourslam.report.config_file import read_config, write_config
@@ -21,6 +21,7 @@ from contourslam.report.map_reader import read_geojson
 from contourslam.report.nav2_map import write_nav2_map
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.scan_table import read_scan_table, write_scan_table
+from contourslam.report.svg.way import map_drawing
 from contourslam.slam.dense import dense_trajectory
 from contourslam.slam.result import OdometryReadings, RunResult
 
@@ -71,7 +72,7 @@ def write_result_folder(
     *,
     grid: OccupancyGrid | None = None,
     command: str = "",
-) -> tuple[str, ...]:
+) -> None:
     """Write what a run leaves behind; files of the same names are replaced, others are left alone.
 
     The trajectories hold a pose at each scan and at each odometry reading (:mod:`contourslam.slam.dense`).
@@ -92,11 +93,6 @@ def write_result_folder(
         Written as ``map.pgm`` and ``map.yaml`` where given.
     command : str
         The command line, kept with the configuration.
-
-    Returns
-    -------
-    tuple of str
-        What could not be done without harm to the rest, such as the picture where matplotlib is not installed.
 
     Raises
     ------
@@ -135,13 +131,7 @@ def write_result_folder(
         "skipped": result.skipped,
     }
     write_text(folder / "metrics.json", to_json({**run, **metrics}))
-    try:
-        from contourslam.report.figures.save import save_figure
-        from contourslam.report.figures.world import world_figure
-    except MissingExtraError as error:
-        return (f"map.png is left out: {error}",)
-    save_figure(world_figure(result, grid=grid), folder / "map.png")
-    return ()
+    write_text(folder / "map.svg", map_drawing(result).text)
 
 
 def read_result_folder(folder: Path) -> StoredRun:

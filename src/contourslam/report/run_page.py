@@ -5,9 +5,13 @@ from typing import Any
 
 from contourslam import __version__
 from contourslam.config import Config
-from contourslam.errors import MissingExtraError
 from contourslam.evaluation.relations import JudgedRelations
 from contourslam.report.atomic import make_folder, remove, write_text
+from contourslam.report.page.markup import page
+from contourslam.report.page.run import building, loops, matching, reproduce, timings, truth
+from contourslam.report.page.run import relations as known
+from contourslam.report.page.run.headline import headline, lead
+from contourslam.report.page.run.values import RunValues
 from contourslam.report.relation_table import write_relation_table
 from contourslam.slam.result import RunResult
 
@@ -23,7 +27,7 @@ def write_run_page(
     *,
     command: str = "",
     name: str = "",
-) -> tuple[str, ...]:
+) -> None:
     """Write ``index.html`` and, where relations are given, ``relation_errors.csv``.
 
     Parameters
@@ -44,11 +48,6 @@ def write_run_page(
     name : str
         Title of the page; the folder's name where left out.
 
-    Returns
-    -------
-    tuple of str
-        What could not be done without harm to the rest: the page, where matplotlib is not installed.
-
     Raises
     ------
     ResultError
@@ -59,16 +58,6 @@ def write_run_page(
         remove(folder / "relation_errors.csv")  # an earlier run's would not belong to this one
     else:
         write_relation_table(folder / "relation_errors.csv", relations)
-    try:
-        from contourslam.report.page.run import building, loops, matching, reproduce, timings, truth
-        from contourslam.report.page.run import relations as known
-    except MissingExtraError as error:
-        remove(folder / "index.html")
-        return (f"index.html is left out: {error}",)
-    from contourslam.report.page.markup import page
-    from contourslam.report.page.run.headline import headline, lead
-    from contourslam.report.page.run.values import RunValues
-
     values = RunValues(result, config, metrics, relations, command)
     parts = [
         building.section(values),
@@ -88,4 +77,3 @@ def write_run_page(
         banner="" if result.complete else _INCOMPLETE,
     )
     write_text(folder / "index.html", text)
-    return ()

@@ -1,9 +1,9 @@
 """The map, the way driven and the loops that were closed."""
 
-from contourslam.report.figures.way import map_figure
 from contourslam.report.page.album import embedded
 from contourslam.report.page.markup import Section, figure
 from contourslam.report.page.run.values import RunValues, count
+from contourslam.report.svg.way import map_drawing
 
 
 def section(values: RunValues) -> Section:
@@ -17,7 +17,7 @@ def section(values: RunValues) -> Section:
             "the same place; the colour says how far the estimate was off before."
         )
     picture = embedded(
-        map_figure(result),
+        map_drawing(result),
         alt=f"Map with {count(len(result.corner_map.ids), 'corner')}, {count(len(result.wall_map.ids), 'wall')}, "
         f"the way driven and {count(len(result.loops), 'loop')}",
         caption=caption,

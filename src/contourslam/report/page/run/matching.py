@@ -1,9 +1,9 @@
 """How well scans and landmarks fitted, over time."""
 
-from contourslam.report.figures.series import matching_figure
 from contourslam.report.page.album import embedded
 from contourslam.report.page.markup import Section, figure
 from contourslam.report.page.run.values import RunValues
+from contourslam.report.svg.series import matching_drawing
 
 
 def section(values: RunValues) -> Section | None:
@@ -19,7 +19,7 @@ def section(values: RunValues) -> Section | None:
             "NIS: the innovation of the landmarks against what the filter expected; far above 1 it is too sure."
         )
     picture = embedded(
-        matching_figure(values.result),
+        matching_drawing(values.result),
         alt=" and ".join(["matching quality"] * quality + ["normalised innovation squared"] * corrected) + " over time",
         caption=" ".join([*said, "Lines are running medians, bands hold 90 % of the scans."]),
     )

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from contourslam.report.figures.series import relation_figure
-from contourslam.report.figures.way import error_map_figure
 from contourslam.report.page.album import embedded
 from contourslam.report.page.markup import Cell, Row, Section, figure, paragraph, table
 from contourslam.report.page.run.values import RunValues, count, degrees, length
+from contourslam.report.svg.series import relation_drawing
+from contourslam.report.svg.way import error_map_drawing
 
 _HEADERS = ("", "mean", "sd", "median", "max", "rotation, mean", "rotation, median")
 
@@ -26,12 +26,12 @@ def section(values: RunValues) -> Section | None:
     caption = f"Error over {count(len(judged.stamps), 'known relative pose')} (Kuemmerle et al. 2009)"
     later = judged.stamps[:, 1]
     over_time = embedded(
-        relation_figure(later - values.begin, errors),
+        relation_drawing(later - values.begin, errors),
         alt="Error of each relation over time on a logarithmic scale: " + ", ".join(errors),
         caption="Each relation at its second time, on a logarithmic scale; errors below 1 mm are drawn at 1 mm.",
     )
     over_map = embedded(
-        error_map_figure(values.result, later, judged.estimate.translation),
+        error_map_drawing(values.result, later, judged.estimate.translation),
         alt="Map with a dot for each relation where the robot was at its second time, coloured by its error",
         caption="The same errors at the place where the robot was at the second time, the largest on top.",
     )

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from contourslam.report.figures.errors import error_figure
 from contourslam.report.page.album import embedded
 from contourslam.report.page.markup import Cell, Row, Section, figure, table
 from contourslam.report.page.run.values import RunValues, degrees, length
+from contourslam.report.svg.series import error_drawing
 
 
 def section(values: RunValues) -> Section | None:
@@ -24,7 +24,7 @@ def section(values: RunValues) -> Section | None:
     rows.append(Row("estimate inside ±2σ (ideal 95.4 %)", [Cell(_percent(inside.get(k))) for k in ("x", "y", "theta")]))
     numbers = table("RMS error against the true poses", ["", "x", "y", "heading"], rows)
     picture = embedded(
-        error_figure(result),
+        error_drawing(result),
         alt="Error of x, y and heading over time inside the bounds of two standard deviations",
         caption=f"Error over time and ±2σ of what the filter states. NEES {metrics['nees'] or 0.0:.2f}, ideal 3.",
     )
