@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.graph.association import TIGHT_GATES, unlikeness
+from contourslam.graph.association import TIGHT_GATES
 from contourslam.graph.landmark_fit import fit
-from contourslam.graph.sightings import COLUMNS, END, KIND, PXX, PYY, START, Sightings, to_world
+from contourslam.graph.landmark_index import empty_index, insert, likest
+from contourslam.graph.sightings import END, KIND, PXX, PYY, START, Sightings, to_world
 from contourslam.kernels import kernel
 from contourslam.slam.measurement import CORNER
 
@@ -47,51 +48,31 @@ class LandmarkSet:
 
 
 @kernel
-def _cluster(world: Floats, order: Ints, gates: Floats) -> tuple[Ints, Floats]:
-    """Sort sightings, best first, each to the likest landmark so far, or let it begin one of its own."""
-    labels = np.empty(world.shape[0], np.int64)
-    table = np.empty((world.shape[0], COLUMNS))
-    count = 0
+def _cluster(world: Floats, order: Ints, gates: Floats) -> Ints:
+    """Sort rows, those early in `order` first, each to the likest that began a landmark before it, or let it begin one.
+
+    Returns for each row the one that began its landmark, itself if it did.
+    """
+    into = np.empty(world.shape[0], np.int64)
+    index = empty_index(world)
     for i in order:
-        best, labels[i] = np.inf, count
-        for j in range(count):
-            cost = unlikeness(world[i], table[j], gates)
-            if cost < best:
-                best, labels[i] = cost, j
-        if labels[i] == count:
-            table[count] = world[i]
-            count += 1
-    return labels, table[:count].copy()
+        into[i] = likest(index, world, world[i], gates)
+        if into[i] < 0:
+            into[i] = i
+            insert(index, world[i], i)
+    return into
 
 
 @kernel
 def _assign(world: Floats, table: Floats, gates: Floats) -> Ints:
-    labels = np.full(world.shape[0], -1, np.int64)
+    """Likest landmark of each row, -1 for none."""
+    labels = np.empty(world.shape[0], np.int64)
+    index = empty_index(table)
+    for j in range(table.shape[0]):
+        insert(index, table[j], j)
     for i in range(world.shape[0]):
-        best = np.inf
-        for j in range(table.shape[0]):
-            cost = unlikeness(world[i], table[j], gates)
-            if cost < best:
-                best, labels[i] = cost, j
+        labels[i] = likest(index, table, world[i], gates)
     return labels
-
-
-@kernel
-def _merge(table: Floats, order: Ints, gates: Floats) -> Ints:
-    """Landmark that each landmark becomes part of, itself if none; those early in `order` take in the later ones."""
-    into = np.empty(order.size, np.int64)
-    roots = np.empty(order.size, np.int64)
-    count = 0
-    for j in order:
-        best, into[j] = np.inf, j
-        for k in range(count):
-            cost = unlikeness(table[j], table[roots[k]], gates)
-            if cost < best:
-                best, into[j] = cost, roots[k]
-        if into[j] == j:
-            roots[count] = j
-            count += 1
-    return into
 
 
 @kernel
@@ -130,11 +111,12 @@ def find_landmark_set(sightings: Sightings, poses: Floats) -> LandmarkSet:
     world = to_world(rows, keys, poses)
     # The surest first: corners by their covariance, walls by their length.
     order = np.argsort(np.where(rows[:, KIND] == CORNER, rows[:, PXX] + rows[:, PYY], rows[:, START] - rows[:, END]))
-    labels, table = _cluster(world, order, TIGHT_GATES)
+    begun, labels = np.unique(_cluster(world, order, TIGHT_GATES), return_inverse=True)
+    table = world[begun]
     for _ in range(ROUNDS):
         table = fit(world, labels, table)
         counts = np.bincount(labels[labels >= 0], minlength=len(table))
-        into = _merge(table, np.argsort(-counts, kind="stable"), TIGHT_GATES)
+        into = _cluster(table, np.argsort(-counts, kind="stable"), TIGHT_GATES)
         labels = np.where(labels >= 0, into[labels], -1)
         table = fit(world, labels, table)[np.unique(into)]
         labels = _assign(world, table, TIGHT_GATES)

@@ -236,10 +236,7 @@ class Landmarks:
         born: list[int] = []
         for i, j in enumerate(chosen.tolist()):
             if j == NONE:
-                row = self._begin(world[i])
-                self._making[row] = [first + i]
-                self._last[row], self._node[row] = key, node
-                continue
+                j = self._begin(world[i])
             if j < 0:
                 continue
             again = self._last[j] == key  # another piece of one wall
@@ -270,7 +267,8 @@ class Landmarks:
                 setattr(self, name, np.concatenate([getattr(self, name), np.full(j, -1)]))
             self._stale = np.concatenate([self._stale, np.zeros(j, np.bool_)])
         self._used = max(self._used, j + 1)
-        self.table[j], self._ids[j], self._observed[j], self._failed[j] = row, -1, 1, 0
+        self.table[j], self._making[j] = row, []
+        self._ids[j], self._observed[j], self._failed[j], self._last[j] = -1, 0, 0, -1
         return j
 
     def _bear(self, j: int) -> int:
