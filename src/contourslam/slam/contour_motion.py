@@ -1,25 +1,53 @@
 """The motion between two scans as their contours have it, in place of the wheels' alone."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from contourslam.contour.contours import Floats
 from contourslam.geometry.poses import between_one
-from contourslam.matching.odometry import FLOOR, ContourOdometry
+from contourslam.matching.odometry import FLOOR, KEY_DISTANCE, ContourOdometry
 from contourslam.matching.rescue import LOOSE
 from contourslam.matching.small import invert, turned
 from contourslam.scan import LaserScan
 from contourslam.slam.wheels import Wheels
 
-PER_STEP = 0.1  # m, or rad, of motion that `FLOOR` is meant for
+LEAST = 0.02  # m, and rad: a robot that moved less may as well have stood still
+
+
+@dataclass(frozen=True, slots=True)
+class ContourStep:
+    """Motion from one scan to the next.
+
+    Attributes
+    ----------
+    increment : ndarray, shape (3,)
+        In the frame of the base at the earlier scan: m, m, rad.
+    covariance : ndarray, shape (3, 3)
+        In that frame.
+    quality : float
+        How well the contours fitted, at most 1; 0 where nothing could be aligned.
+    aligned : bool
+        False where there was nothing to align, and all that is known comes from the wheels.
+    moved : float
+        Length of the motion, m, with 1 rad of turning counted as 1 m.
+    """
+
+    increment: Floats
+    covariance: Floats
+    quality: float
+    aligned: bool
+    moved: float
 
 
 class ContourMotion:
     """Contour odometry beside a filter: what it says of each step, with a covariance to predict with.
 
-    Both scans of a step were aligned to the same contours of the last metres, so their errors are small and do not add
-    up along it; a filter takes them as independent from step to step all the same, which errs on the safe side.
+    Two scans a few centimetres apart are aligned to the same contours: their errors are alike and do not add up from
+    scan to scan, but they do from one stretch of contours to the next. So one alignment's covariance, and `FLOOR`, are
+    counted once per keyframe distance; the jitter of the single pose within it belongs to the measurements, see
+    :func:`contourslam.slam.observation.loosened`.
 
     Parameters
     ----------
@@ -32,10 +60,8 @@ class ContourMotion:
         self._last_step: Floats = np.zeros(3)
         self._last_elapsed, self._stamp = 0.0, -math.inf
 
-    def step(
-        self, scan: LaserScan, oriented: Floats, wheels: Wheels, motion: tuple[Floats, Floats]
-    ) -> tuple[Floats, Floats, float]:
-        """Motion since the last scan, its covariance, and how well the contours fitted.
+    def step(self, scan: LaserScan, oriented: Floats, wheels: Wheels, motion: tuple[Floats, Floats]) -> ContourStep:
+        """Motion since the last scan; none at the first.
 
         Parameters
         ----------
@@ -49,21 +75,22 @@ class ContourMotion:
 
         Returns
         -------
-        increment : ndarray, shape (3,)
-            In the frame of the base at the last scan: m, m, rad.
-        covariance : ndarray, shape (3, 3)
-            In that frame. Directions that the contours fix are known by them, those that they leave open by the wheels.
-        quality : float
-            0 where nothing could be aligned, then the increment is the wheels', to 1.
+        ContourStep
+            Directions that the contours fix are known as well as these say, those that they leave open as well as the
+            wheels say. Where nothing could be aligned it is the wheels' step with the wheels' covariance.
         """
         increment, noise = wheels.step_or_guess(scan.stamp, motion, self._last_step, self._last_elapsed)
-        before = self._odometry.pose
+        before, first = self._odometry.pose, not math.isfinite(self._stamp)
         found = self._odometry.push(oriented, increment, noise)
         step = between_one(before, found.pose)
-        self._last_step, self._last_elapsed, self._stamp = step, scan.stamp - self._stamp, scan.stamp
+        self._last_step, self._last_elapsed = step, scan.stamp - self._stamp
+        self._stamp = scan.stamp
+        moved = math.hypot(step[0], step[1]) + abs(float(step[2]))
+        if first:
+            return ContourStep(step, 1e-10 * np.eye(3), found.quality, False, moved)
         if found.alignment is None:
-            return step, noise, found.quality
+            return ContourStep(step, noise, found.quality, False, moved)
         prior = turned(LOOSE, -before[2]) if found.slipped else invert(noise)
-        moved = (math.hypot(step[0], step[1]) + abs(float(step[2]))) / PER_STEP
-        covariance = invert(prior + turned(found.alignment.information, -before[2])) + min(moved, 1.0) * FLOOR
-        return step, covariance, found.quality
+        keyframes = moved / KEY_DISTANCE
+        information = turned(found.alignment.information, -before[2]) / min(max(keyframes, LEAST / KEY_DISTANCE), 1.0)
+        return ContourStep(step, invert(prior + information) + keyframes * FLOOR, found.quality, True, moved)

@@ -13,13 +13,13 @@ from contourslam.matching.oriented import move, oriented_points
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam import ekf
 from contourslam.slam.association import Model, associate
-from contourslam.slam.contour_motion import ContourMotion
+from contourslam.slam.contour_motion import ContourMotion, ContourStep
 from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twins
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import predict_measurements
 from contourslam.slam.motion import predict
-from contourslam.slam.observation import Observations, observe, to_world
+from contourslam.slam.observation import Observations, looks_alike_for, loosened, observe, to_world
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import expected_in_scan
 from contourslam.slam.wheels import Wheels
@@ -104,15 +104,17 @@ class ContourSlam:
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
-        quality = self._predict(scan, motion, contours)
-        seen = observe(found.corners, found.walls)
+        step = self._predict(scan, motion, contours)
+        seen, alike = observe(found.corners, found.walls), 1.0
+        if step is not None:
+            seen, alike = loosened(seen), looks_alike_for(step.moved)
         world = to_world(self.filter.mean[:3], self.mount, seen.looks)
         model = self._expect()
         self._lap("prediction")
-        chosen = self._associate(seen, world, model)
+        chosen = self._associate(seen, world, model, may_slip=step is None or not step.aligned)
         self._lap("association")
         matched = (chosen >= 0).nonzero()[0]
-        nis = self._correct(matched, chosen[matched], seen.values, seen.noises, model)
+        nis = self._correct(matched, chosen[matched], seen.values, alike * seen.noises, model)
         self._lap("correction")
         missed = self._count_sightings(scan, chosen[matched], world[matched])
         matched_ids = tuple(self.filter.ids[chosen[matched]].tolist())
@@ -122,7 +124,7 @@ class ContourSlam:
         pose, covariance = self.filter.pose, self.filter.pose_covariance
         return ScanUpdate(
             scan.stamp, pose, covariance, len(found.corners), len(found.walls), matched_ids, missed, born, dropped, nis,
-            2 * len(matched), quality,
+            2 * len(matched), None if step is None else step.quality,
         )  # fmt: skip
 
     @property
@@ -141,33 +143,35 @@ class ContourSlam:
         """Walls of the map as they stand now."""
         return self.filter.wall_map()
 
-    def _predict(self, scan: LaserScan, motion: tuple[Floats, Floats], contours: Contours) -> float | None:
-        """Move the pose to the scan's stamp along the contours' or the wheels' motion (eqs 23-24, 28)."""
-        quality = None
+    def _predict(self, scan: LaserScan, motion: tuple[Floats, Floats], contours: Contours) -> ContourStep | None:
+        """Move the pose to the scan's stamp, along the contours or the wheels alone (eqs 23-24, 28)."""
+        found = None
         if self._contours is None:
             step = self._wheels.step(scan.stamp, motion)
         else:
-            oriented = move(oriented_points(contours), self.mount)
-            *step, quality = self._contours.step(scan, oriented, self._wheels, motion)
+            found = self._contours.step(scan, move(oriented_points(contours), self.mount), self._wheels, motion)
+            step = found.increment, found.covariance
             self._lap("matching")
-        if step is None:
-            return quality
-        f = self.filter
-        start = self._linearised_at if self.config.slam.first_estimates else f.pose
-        predict(f.mean, f.covariance, f.size, *step, start)
-        self._linearised_at = f.pose
-        return quality
+        if step is not None:
+            f = self.filter
+            start = self._linearised_at if self.config.slam.first_estimates else f.pose
+            predict(f.mean, f.covariance, f.size, *step, start)
+            self._linearised_at = f.pose
+        return found
 
     def _expect(self) -> Model:
         f, first = self.filter, self.config.slam.first_estimates
         return predict_measurements(f.mean[:3], self.mount, f.mean, f.table, f.count, first)
 
-    def _associate(self, seen: Observations, world: Floats, model: Model) -> Ints:
-        """Associate; where little matches, ask whether more would if the wheels had slipped since the last scan."""
+    def _associate(self, seen: Observations, world: Floats, model: Model, *, may_slip: bool) -> Ints:
+        """Associate; where little matches, ask whether more would if the wheels had slipped since the last scan.
+
+        Contours that were aligned have answered that already, and among many landmarks a false answer is easily found.
+        """
         f, config = self.filter, self.config.slam
         chosen = associate(seen, world, f, model, config)
         matched = int((chosen >= 0).sum())
-        if config.association != "joint" or matched > 0.5 * len(seen) or len(seen) < SLIP_PAIRS:
+        if not may_slip or config.association != "joint" or matched > 0.5 * len(seen) or len(seen) < SLIP_PAIRS:
             return chosen
         before = f.covariance[:3, :3].copy()
         f.covariance[:3, :3] += SLIP
