@@ -8,6 +8,7 @@ import numpy as np
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between, between_one, compose, compose_one
 from contourslam.matching.cell_map import CellMap
+from contourslam.matching.certainty import Hold, hold, match_covariance
 from contourslam.matching.odometry import LocalMap
 
 KEPT = 48  # places whose contours are held ready; those of others are put together again from their keyframes
@@ -25,11 +26,14 @@ class Keyframe:
         Base in the frame of the contour odometry.
     oriented : ndarray of float32, shape (n, 4)
         Contour points and normals in the frame of the base.
+    blur : float
+        Variance of its heading from turns during the scan that are not known, rad^2.
     """
 
     stamp: float
     local: Floats
     oriented: np.ndarray
+    blur: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,7 @@ class Places:
         self.list: list[Place] = []
         self._keyframes, self._half_width = keyframes, half_width
         self._ready: OrderedDict[int, CellMap] = OrderedDict()
+        self._holds: dict[int, Hold] = {}
         self._anchors: Floats = np.empty((16, 3))
         self._offsets: Floats = np.zeros((16, 3))
         self._centres: Floats = np.empty((16, 3))
@@ -127,6 +132,22 @@ class Places:
         if len(self._ready) > KEPT:
             self._ready.popitem(last=False)
         return cells
+
+    def match_covariance(self, number: int, key: int, seen: Floats) -> Floats:
+        """Covariance of a keyframe's pose as seen from a place's anchor, in the keyframe's frame.
+
+        Parameters
+        ----------
+        number, key : int
+            Of the place, and of the keyframe that was aligned to it.
+        seen : ndarray, shape (3,)
+            The keyframe's pose as seen from the anchor.
+        """
+        cells, keyframe, anchor = self.cells(number), self._keyframes[key], np.zeros(3)
+        if number not in self._holds:
+            first = self._keyframes[self.list[number].anchor]
+            self._holds[number] = hold(first.oriented, cells, anchor, inside=True)
+        return match_covariance(hold(keyframe.oriented, cells, seen), seen, self._holds[number], anchor, keyframe.blur)
 
     def around(self, number: int) -> Floats:
         """Contour points of a place, the one before and the one after, in the frame of its anchor: x, y, nx, ny."""

@@ -5,11 +5,12 @@ its pull grows less than their number says, and not at all along a bare corridor
 surfaces there. Neighbouring points err alike. And a relative pose has two ends.
 
 The covariance is that of an M-estimator, A^-1 M A^-1 (Huber, "Robust Statistics", 1981, section 6.3): A says how the
-pull grows when the scan is pushed, partners found anew; M how much the pull of the parts of a scan scatters, by blocks
+pull grows when the scan is pushed, partners found anew; M how much the pulls of the parts of a scan scatter, by blocks
 of neighbouring points (Liang and Zeger, "Longitudinal data analysis", Biometrika 1986).
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,25 +31,29 @@ FLOOR = np.diag([0.001**2, 0.001**2, math.radians(0.02) ** 2])
 
 @kernel
 def pull(
-    index: Tiles, tiles: Tiles, rows: Floats, x0: float, y0: float, oriented: Floats, pose: Floats, blocks: int,
-    sightings: float,
-) -> tuple[Floats, Floats, float, float]:  # fmt: skip
-    """Pull of a map on a scan, by blocks of neighbouring points.
+    index: Tiles, tiles: Tiles, rows: Floats, x0: float, y0: float, oriented: Floats, pose: Floats, sightings: float,
+    pulls: Floats, parts: Floats,
+) -> float:  # fmt: skip
+    """Pull of a map on a scan, half the gradient of the robust sum of squares, by blocks of neighbouring points.
+
+    Parameters
+    ----------
+    sightings : float
+        Points of the map that were seen less often do not count.
+    pulls : ndarray, shape (blocks, 3)
+        Is filled: sums of weight times distance times the direction in which the pose changes the distance.
+    parts : ndarray, shape (blocks, 3, 3) or (0, 3, 3)
+        Is filled where there is room: sums of weight times the square of that direction.
 
     Returns
     -------
-    pulls : ndarray, shape (blocks, 3)
-        Half the gradient of the robust sum of squares: of a point, its weight times its distance times `lines`.
-    stiffness : ndarray, shape (blocks, 3, 3)
-        Sums of weights times the squares of `lines`: how the pulls grow if the partners stay the same.
-    weights, squares : float
-        Sums of the weights, and of the squares of weights times distances.
+    float
+        Mean square of the distances, m^2.
     """
-    pulls, stiffness = np.zeros((blocks, 3)), np.zeros((blocks, 3, 3))
-    weights = squares = 0.0
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    line = np.empty(3)
-    n = oriented.shape[0]
+    pulls[:], parts[:] = 0.0, 0.0
+    weights = squares = 0.0
+    n, blocks = oriented.shape[0], pulls.shape[0]
     for k in range(n):
         rx = cos * oriented[k, 0] - sin * oriented[k, 1]
         ry = sin * oriented[k, 0] + cos * oriented[k, 1]
@@ -57,67 +62,137 @@ def pull(
         if near < 0:
             continue
         row = rows[near]
-        if row[4] < sightings:
-            continue
+        a, b = row[2], row[3]
         nx, ny = cos * oriented[k, 2] - sin * oriented[k, 3], sin * oriented[k, 2] + cos * oriented[k, 3]
-        if nx * row[2] + ny * row[3] < 0.7:
+        if row[4] < sightings or nx * a + ny * b < 0.7:
             continue
-        d = row[2] * (x - row[0]) + row[3] * (y - row[1])
-        w = 1.0 / (1.0 + (d / WIDTH) ** 2) ** 2
-        line[0], line[1], line[2] = row[2], row[3], row[3] * rx - row[2] * ry
-        b = k * blocks // n
-        for i in range(3):
-            pulls[b, i] += w * d * line[i]
-            for j in range(3):
-                stiffness[b, i, j] += w * line[i] * line[j]
-        weights += w
-        squares += (w * d) ** 2
-    return pulls, stiffness, weights, squares
+        d = a * (x - row[0]) + b * (y - row[1])
+        v = 1.0 / (1.0 + (d / WIDTH) ** 2)
+        w, lever = v * v, b * rx - a * ry
+        out = pulls[k * blocks // n]
+        out[0] += w * d * a
+        out[1] += w * d * b
+        out[2] += w * d * lever
+        if parts.shape[0]:
+            h = parts[k * blocks // n]
+            h[0, 0] += w * a * a
+            h[0, 1] += w * a * b
+            h[1, 1] += w * b * b
+            h[0, 2] += w * a * lever
+            h[1, 2] += w * b * lever
+            h[2, 2] += w * lever * lever
+            weights += w
+            squares += w * w * d * d
+    for i in range(parts.shape[0]):
+        h = parts[i]
+        h[1, 0], h[2, 0], h[2, 1] = h[0, 1], h[0, 2], h[1, 2]
+    return squares / max(weights, 1e-9)
 
 
 @kernel
-def _measure(
-    index: Tiles, tiles: Tiles, rows: Floats, x0: float, y0: float, oriented: Floats, pose: Floats, sightings: float
-) -> tuple[Floats, Floats, float]:
-    """A and the pattern of M, in the map's axes, and the variance that M has with it, m^2."""
-    pulls, parts, weights, squares = pull(index, tiles, rows, x0, y0, oriented, pose, BLOCKS, sightings)
-    pattern = parts.sum(axis=0)
-    for i in range(3):
-        pattern[i, i] += 1e-6
-    inverse = invert(pattern)
-    # Turns count as much as shifts; the fit has taken up a part of the scatter, which is H_b H^-1 H_b of a block.
-    lever = 0.5 * (pattern[0, 0] + pattern[1, 1]) / pattern[2, 2]
+def _scatter(pulls: Floats, parts: Floats, whole: Floats) -> float:
+    """Variance of a point by which the blocks' pulls scatter as they do, m^2; 0 where the fit leaves nothing to see."""
+    inverse = invert(whole)
+    lever = 0.5 * (whole[0, 0] + whole[1, 1]) / whole[2, 2]  # so that turns count as much as shifts
     scatter, free = 0.0, 0.0
-    for i in range(3):
-        scale = lever if i == 2 else 1.0
-        for b in range(BLOCKS):
-            scatter += scale * pulls[b, i] ** 2
-            free += scale * parts[b, i, i]
+    for b in range(pulls.shape[0]):
+        # The fit has taken up a part of what the block would scatter: H_b H^-1 H_b.
+        for i in range(3):
+            scale = lever if i == 2 else 1.0
+            taken = 0.0
             for j in range(3):
-                for m in range(3):
-                    free -= scale * parts[b, i, j] * inverse[j, m] * parts[b, m, i]
-    alone = squares / max(weights, 1e-9)
-    variance = max(scatter / max(free, 1e-9), alone, LEAST) if free > 0.05 * weights else max(alone, LEAST)
-    growth = np.empty((3, 3))
+                for k in range(3):
+                    taken += parts[b, i, j] * inverse[j, k] * parts[b, k, i]
+            scatter += scale * pulls[b, i] ** 2
+            free += scale * (parts[b, i, i] - taken)
+    return scatter / free if free > 0.05 * (whole[0, 0] + whole[1, 1]) else 0.0
+
+
+@kernel
+def _hold(
+    index: Tiles, tiles: Tiles, rows: Floats, x0: float, y0: float, oriented: Floats, pose: Floats, sightings: float
+) -> tuple[Floats, float]:  # fmt: skip
+    """Information of a scan's pose in the map, in the scan's frame, and the variance of a point."""
+    pulls, parts = np.empty((BLOCKS, 3)), np.empty((BLOCKS, 3, 3))
+    alone = pull(index, tiles, rows, x0, y0, oriented, pose, sightings, pulls, parts)
+    whole = np.zeros((3, 3))
+    for i in range(3):
+        whole[i, i] = 1e-6
+    for b in range(BLOCKS):
+        whole += parts[b]
+    variance = max(_scatter(pulls, parts, whole), alone, LEAST)
+    growth, ahead, behind, none = np.empty((3, 3)), np.empty((1, 3)), np.empty((1, 3)), np.empty((0, 3, 3))
     for i in range(3):
         size = PUSH_ANGLE if i == 2 else PUSH
         pushed = pose.copy()
         pushed[i] = pose[i] + size
-        ahead = pull(index, tiles, rows, x0, y0, oriented, pushed, 1, sightings)[0]
+        pull(index, tiles, rows, x0, y0, oriented, pushed, sightings, ahead, none)
         pushed[i] = pose[i] - size
-        behind = pull(index, tiles, rows, x0, y0, oriented, pushed, 1, sightings)[0]
+        pull(index, tiles, rows, x0, y0, oriented, pushed, sightings, behind, none)
         for j in range(3):
             growth[i, j] = (ahead[0, j] - behind[0, j]) / (2.0 * size)
+    growth = 0.5 * (growth + growth.T)
+    # Products are spelled out: Numba's own need SciPy.
+    inverse = invert(whole)
+    out = np.zeros((3, 3))
     for i in range(3):
-        for j in range(i):
-            growth[i, j] = growth[j, i] = 0.5 * (growth[i, j] + growth[j, i])
-    return growth, pattern, variance
+        for j in range(3):
+            for k in range(3):
+                for m in range(3):
+                    out[i, j] += growth[i, k] * inverse[k, m] * growth[m, j] / variance
+    return turned(out, -pose[2]), variance
 
 
-def contour_information(
-    oriented: Floats, cells: CellMap, pose: Floats, least: float = 0.0, sightings: float = 0.0
-) -> tuple[Floats, float]:
-    """Information that the contours have about the pose of a scan that was aligned to them.
+@kernel
+def _as_seen(own: Floats, pose: Floats, others: Floats, anchor: Floats) -> Floats:
+    """Covariance of one scan as seen from another, in its own frame, from what each has in its frame."""
+    x, y = pose[0] - anchor[0], pose[1] - anchor[1]
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    # The other one's error moves this one as if both sat on the same stiff frame.
+    gx, gy = sin * x - cos * y, cos * x + sin * y
+    p = turned(others, anchor[2] - pose[2])
+    out = own + p
+    out[0, 0] += 2.0 * gx * p[0, 2] + gx * gx * p[2, 2]
+    out[0, 1] += gx * p[1, 2] + gy * p[0, 2] + gx * gy * p[2, 2]
+    out[1, 1] += 2.0 * gy * p[1, 2] + gy * gy * p[2, 2]
+    out[0, 2] += gx * p[2, 2]
+    out[1, 2] += gy * p[2, 2]
+    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """What a map knows of the pose of a scan in it.
+
+    Attributes
+    ----------
+    information : ndarray, shape (3, 3)
+        In the scan's frame; nearly singular where the contours leave a direction open.
+    variance : float
+        Of a point, larger where neighbours err alike, m^2; the information is inversely proportional to it.
+    """
+
+    information: Floats
+    variance: float
+
+    def covariance(self, variance: float, blur: float) -> Floats:
+        """Covariance of the pose, in the scan's frame.
+
+        Parameters
+        ----------
+        variance : float
+            Of a point, if that is more than its own, m^2.
+        blur : float
+            Variance of the heading from turns during the scan that are not known, rad^2.
+        """
+        out = invert(self.information * min(self.variance / variance, 1.0) + OPEN) + FLOOR
+        out[2, 2] += blur
+        return out
+
+
+def hold(oriented: Floats, cells: CellMap, pose: Floats, *, inside: bool = False) -> Hold:
+    """Measure how well a map holds a scan that was aligned to it.
 
     Parameters
     ----------
@@ -126,26 +201,15 @@ def contour_information(
     cells : CellMap
     pose : ndarray, shape (3,)
         Where they were aligned to.
-    least : float
-        Variance of a point below which it is not taken, m^2.
-
-    Returns
-    -------
-    information : ndarray, shape (3, 3)
-        In the scan's frame; nearly singular where the contours leave a direction open.
-    variance : float
-        Of a point, larger where neighbours err alike, m^2.
+    inside : bool
+        The scan is a part of the map: points of the map that no other scan saw do not count.
     """
-    growth, pattern, variance = _measure(
-        cells.index, cells.tiles, cells.rows, cells.x0, cells.y0, oriented, np.asarray(pose, np.float64), sightings
-    )
-    variance = max(variance, least)
-    return turned(growth @ invert(pattern * variance) @ growth, -pose[2]), variance
+    sightings = 2.0 if inside else 0.0
+    points = np.asarray(oriented, np.float64)
+    return Hold(*_hold(cells.index, cells.tiles, cells.rows, cells.x0, cells.y0, points, pose, sightings))
 
 
-def match_covariance(
-    oriented: Floats, cells: CellMap, pose: Floats, first: Floats, anchor: Floats, blur: float = 0.0
-) -> Floats:
+def match_covariance(own: Hold, pose: Floats, first: Hold, anchor: Floats, blur: float = 0.0) -> Floats:
     """Covariance of a scan's pose as seen from the scan that its local map began with.
 
     Both scans have errors of their own: what one sees of a cross wall does not help if the other saw none. An error of
@@ -153,9 +217,9 @@ def match_covariance(
 
     Parameters
     ----------
-    oriented, first : ndarray, shape (n, 4) and (m, 4)
-        Points and normals of the scan, and of the one that the map began with, each in its frame.
-    cells : CellMap
+    own, first : Hold
+        Of the scan, and of the one that the map began with. The points of that one lie in the map near themselves, and
+        are taken to scatter no less than the other's.
     pose, anchor : ndarray, shape (3,)
         The two scans in the map.
     blur : float
@@ -166,18 +230,7 @@ def match_covariance(
     ndarray, shape (3, 3)
         In the frame of the scan.
     """
-    limits = FLOOR + np.diag([0.0, 0.0, blur])
-    information, variance = contour_information(oriented, cells, pose)
-    own = invert(information + OPEN) + limits
-    # The first scan lies in the map, and its points near themselves: what they scatter says too little.
-    information, _ = contour_information(first, cells, anchor, variance, 2.0)
-    others = turned(invert(information + OPEN) + limits, anchor[2] - pose[2])
-    # The first scan's error moves the second one as if both sat on the same stiff frame.
-    x, y = pose[0] - anchor[0], pose[1] - anchor[1]
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    swing = np.array([[1.0, 0.0, sin * x - cos * y], [0.0, 1.0, cos * x + sin * y], [0.0, 0.0, 1.0]])
-    covariance: Floats = own + swing @ others @ swing.T
-    return covariance
+    return _as_seen(own.covariance(own.variance, blur), pose, first.covariance(own.variance, blur), anchor)
 
 
 def exposure(offsets: Floats, elapsed: float) -> float:

@@ -10,7 +10,7 @@ from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.matching.align import Alignment, align
 from contourslam.matching.cell_map import CellMap
-from contourslam.matching.certainty import match_covariance
+from contourslam.matching.certainty import Hold, hold, match_covariance
 from contourslam.matching.rescue import LOOSE, find_again
 from contourslam.matching.small import invert, moved
 
@@ -42,8 +42,6 @@ class LocalMap:
         In the frame of the contour odometry.
     members : list of int
         Keyframes whose contours it holds.
-    first : ndarray, shape (n, 4)
-        Points and normals of the anchor's own scan.
     travelled : float
         Length of the stretch, m.
     """
@@ -52,7 +50,8 @@ class LocalMap:
         self.anchor, self.pose = anchor, pose
         self.covariance: Floats = FLOOR.copy()
         self.cells = CellMap(pose, half_width)
-        self.first: Floats = np.empty((0, 4))
+        self._first: Floats = np.empty((0, 4))
+        self._hold: Hold | None = None
         self.members: list[int] = []
         self.travelled = 0.0
 
@@ -60,9 +59,16 @@ class LocalMap:
         """Take in the contours of a keyframe."""
         self.cells.insert(oriented, pose)
         if not self.members:
-            self.first = oriented
+            self._first = oriented
         self.members.append(keyframe)
         self.travelled += distance
+
+    @property
+    def hold(self) -> Hold:
+        """What the map knows of the anchor's own scan, as it was when first asked for."""
+        if self._hold is None:
+            self._hold = hold(self._first, self.cells, self.pose, inside=True)
+        return self._hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +109,17 @@ class Step:
 class ContourOdometry:
     """Poses in a frame that drifts slowly and never jumps; changed in place by every scan.
 
+    Attributes
+    ----------
+    pose : ndarray, shape (3,)
+        Of the base at the last scan.
+    active : LocalMap or None
+        What the next scan is aligned to.
+    keyframes : int
+        How many there are.
+    blur : float
+        Variance of the last scan's heading from turns during it that the wheels did not tell, rad^2.
+
     Parameters
     ----------
     max_range : float
@@ -120,6 +137,7 @@ class ContourOdometry:
         self._motion: Floats = np.zeros(3)  # between the last two scans
         self._turns = np.zeros(2)  # squares of the wheels' errors of turning, and what they should be; running means
         self._taught = 0.0
+        self.blur = 0.0
         self._trusted: Floats = np.zeros(3)  # where the wheels have it, from the last scan that agreed with them
 
     def push(self, oriented: Floats, increment: Floats, noise: Floats, exposure: float = 0.0) -> Step:
@@ -162,12 +180,14 @@ class ContourOdometry:
                 self._learn(wrap_angle(increment[2] - self._motion[2]) ** 2, known, share)
         anchor = 0 if active is None else active.anchor
         distance, turn = self._since_keyframe()
+        self.blur = exposure * turn_noise * self.turn_excess
         keyframe, match, finished = None, None, None
         if active is None or distance > KEY_DISTANCE or turn > KEY_TURN:
             keyframe = self.keyframes
             if active is not None and found is not None:
-                blur = exposure * turn_noise * self.turn_excess
-                match = match_covariance(oriented, active.cells, self.pose, active.first, active.pose, blur)
+                match = match_covariance(
+                    hold(oriented, active.cells, self.pose), self.pose, active.hold, active.pose, self.blur
+                )
             finished = self._keep(oriented, distance)
         about = active or self.newest
         return Step(self.pose, about.covariance, found, anchor, quality, slipped, keyframe, match, finished)
