@@ -14,9 +14,7 @@ from contourslam.slam.measurement import CORNER, WALL
 # Columns of `Observations.looks`.
 KIND, DIRECTION, OPENING, CONVEX, X1, Y1, X2, Y2 = range(8)
 
-JITTER, JITTER_ANGLE = 0.003, math.radians(0.1)  # m, rad
-INDEPENDENT = 1.0  # m, or rad turned, between two looks at a landmark whose errors have nothing to do with each other
-MOST_ALIKE = 10.0  # a robot that stands still gets this part of each look nevertheless: people pass, noise averages
+JITTER, JITTER_ANGLE = 0.003, math.radians(0.1)  # of the pose of a single scan by contour matching: m, rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,26 +92,22 @@ def observe(corners: Corners, walls: Walls) -> Observations:
     )  # fmt: skip
 
 
+@kernel
+def _loosen(noises: Floats, looks: Floats) -> Floats:
+    out = noises.copy()
+    for i in range(looks.shape[0]):
+        angular = 1 if looks[i, KIND] == CORNER else 0  # bearing of a corner, direction of a wall
+        out[i, angular, angular] += JITTER_ANGLE**2
+        out[i, 1 - angular, 1 - angular] += JITTER**2
+    return out
+
+
 def loosened(seen: Observations) -> Observations:
     """Add to the noise what the pose of a single scan jitters by where contour matching gives the motion.
 
     That jitter comes back to zero within a stretch of contours, so it is no part of the motion's own noise.
     """
-    noises = seen.noises.copy()
-    angular = 1 - seen.looks[:, KIND].astype(np.int64)  # second of a corner's two numbers, first of a wall's
-    rows = np.arange(len(noises))
-    noises[rows, angular, angular] += JITTER_ANGLE**2
-    noises[rows, 1 - angular, 1 - angular] += JITTER**2
-    return Observations(seen.values, noises, seen.looks)
-
-
-def looks_alike_for(moved: float) -> float:
-    """How many looks in a row tell no more than one, for a robot that moves by this much (m) from scan to scan.
-
-    What a corner or a wall is measured wrong by, its own bends, its frames, the angle that the beams meet it at, stays
-    the same over some way: a filter that takes such looks as independent believes a bent wall against its own heading.
-    """
-    return min(max(INDEPENDENT / max(moved, 1e-6), 1.0), MOST_ALIKE)
+    return Observations(seen.values, _loosen(seen.noises, seen.looks), seen.looks)
 
 
 @kernel

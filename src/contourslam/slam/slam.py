@@ -19,7 +19,7 @@ from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twi
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import predict_measurements
 from contourslam.slam.motion import predict
-from contourslam.slam.observation import Observations, looks_alike_for, loosened, observe, to_world
+from contourslam.slam.observation import Observations, loosened, observe, to_world
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import expected_in_scan
 from contourslam.slam.wheels import Wheels
@@ -28,6 +28,11 @@ from contourslam.slam.wheels import Wheels
 # twice as many numbers as a pose has.
 SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
 SLIP_PAIRS = 3
+# With contour matching, landmarks are looked for after this way, m, or rad turned, and not before ...
+LOOK_EVERY = 0.1
+# ... and what they are measured wrong by, a wall by its bends and frames and by the angle at which the beams meet it,
+# changes over this one: a filter that takes all the looks for independent believes a bent wall against its heading.
+INDEPENDENT = 1.0
 
 
 def _no_lap(stage: str) -> None:
@@ -80,6 +85,7 @@ class ContourSlam:
         self.start_pose = self.filter.pose
         self._wheels = Wheels(config.slam)
         self._contours = ContourMotion(lidar.max_range) if config.slam.contour_matching else None
+        self._way = LOOK_EVERY  # driven since landmarks were last looked for
         self._linearised_at = self.filter.pose
         self._nursery = Nursery()
         self._lap = lap
@@ -103,11 +109,15 @@ class ContourSlam:
         motion = self._wheels.during(scan)
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
-        found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
         step = self._predict(scan, motion, contours)
+        self._way += LOOK_EVERY if step is None else step.moved
+        if self._way < LOOK_EVERY:  # nothing new to see: the contours carry the pose
+            return self._update(scan, step)
+        found = find_landmarks(contours, self.detector, self.config, self._lap, walls=self.config.slam.walls)
         seen, alike = observe(found.corners, found.walls), 1.0
         if step is not None:
-            seen, alike = loosened(seen), looks_alike_for(step.moved)
+            seen, alike = loosened(seen), max(INDEPENDENT / self._way, 1.0)
+        self._way = 0.0
         world = to_world(self.filter.mean[:3], self.mount, seen.looks)
         model = self._expect()
         self._lap("prediction")
@@ -121,11 +131,21 @@ class ContourSlam:
         born = bear(self.filter, self._nursery, seen, world, chosen, self.mount, self.config.slam)
         dropped = merge_twins(self.filter, chosen[matched]) + drop_unseen(self.filter, self.config.slam)
         self._lap("landmarks")
-        pose, covariance = self.filter.pose, self.filter.pose_covariance
-        return ScanUpdate(
-            scan.stamp, pose, covariance, len(found.corners), len(found.walls), matched_ids, missed, born, dropped, nis,
-            2 * len(matched), None if step is None else step.quality,
+        return self._update(
+            scan, step, corners=len(found.corners), walls=len(found.walls), matched=matched_ids, missed=missed,
+            born=born, dropped=dropped, nis=nis,
         )  # fmt: skip
+
+    def _update(
+        self, scan: LaserScan, step: ContourStep | None, *, corners: int = 0, walls: int = 0,
+        matched: tuple[int, ...] = (), missed: tuple[int, ...] = (), born: tuple[int, ...] = (),
+        dropped: tuple[int, ...] = (), nis: float = 0.0,
+    ) -> ScanUpdate:  # fmt: skip
+        f, quality = self.filter, None if step is None else step.quality
+        pose, covariance = f.pose, f.pose_covariance
+        return ScanUpdate(
+            scan.stamp, pose, covariance, corners, walls, matched, missed, born, dropped, nis, 2 * len(matched), quality
+        )
 
     @property
     def odometry_pose(self) -> Floats:
