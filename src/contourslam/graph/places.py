@@ -11,6 +11,7 @@ from contourslam.matching.cell_map import CellMap
 from contourslam.matching.certainty import Hold, hold, match_covariance
 from contourslam.matching.odometry import LocalMap
 
+ROBUST_TIES = 3.0  # width of the Cauchy kernel of a tie to a place seen before, in standard deviations
 KEPT = 48  # places whose contours are held ready; those of others are put together again from their keyframes
 
 

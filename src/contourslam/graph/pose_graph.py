@@ -1,6 +1,7 @@
 """A factor graph of poses in the plane, over GTSAM: grown step by step by iSAM2, or solved at once."""
 
 import math
+from collections.abc import Sequence
 
 import gtsam
 import numpy as np
@@ -10,6 +11,7 @@ from contourslam.kernels import kernel
 from contourslam.matching.small import turned
 
 # Variables are all Pose2: keyframes, corners (position and direction of the bisector), walls (a point and the normal).
+RELINEARIZE = 3  # updates after which iSAM2 looks for what it must linearise anew
 Robust = float | None  # width of a Cauchy kernel in standard deviations
 
 
@@ -58,7 +60,7 @@ class PoseGraph:
     def __init__(self) -> None:
         parameters = gtsam.ISAM2Params()
         parameters.setRelinearizeThreshold(0.02)
-        parameters.relinearizeSkip = 1
+        parameters.relinearizeSkip = RELINEARIZE
         self._isam = gtsam.ISAM2(parameters)
         self.factors, self.ties = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph()
         self._new = gtsam.NonlinearFactorGraph()
@@ -98,6 +100,11 @@ class PoseGraph:
     def pose(self, key: int) -> Floats:
         """Estimate of one variable."""
         return to_array(self._isam.calculateEstimatePose2(key))
+
+    def poses(self, keys: Sequence[int]) -> Floats:
+        """Estimates of several variables, shape (n, 3)."""
+        values = self._isam.calculateEstimate()
+        return np.array([to_array(values.atPose2(key)) for key in keys]).reshape(-1, 3)
 
     def estimate(self, count: int) -> gtsam.Values:
         """Estimate of the keyframes 0 to `count` - 1."""

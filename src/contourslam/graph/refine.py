@@ -7,11 +7,11 @@ from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between_one
 from contourslam.graph.landmark_factors import relations
 from contourslam.graph.landmark_set import find_landmark_set
-from contourslam.graph.matches import ROBUST_TIES, match_information
-from contourslam.graph.places import Keyframe, Places
+from contourslam.graph.places import ROBUST_TIES, Keyframe, Places
 from contourslam.graph.pose_graph import PoseGraph, joined, keyframes_of, poses_of, relation, solve
 from contourslam.graph.sightings import Sightings
 from contourslam.matching.align import align
+from contourslam.matching.small import invert
 
 REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
 MOST_TIES = 3  # places a keyframe is held against
@@ -70,7 +70,7 @@ def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.Non
             found = align(keyframes[key].oriented, cells, guess, PRIOR)
             off = np.abs(between_one(guess, found.pose))
             if found.overlap >= LEAST_OVERLAP and (off < FARTHEST).all():
-                information = match_information(found.information, found.pose[2])
+                information = invert(places.match_covariance(number, key, found.pose))
                 ties.push_back(relation(anchor, key, found.pose, information, ROBUST_TIES))
     return ties
 

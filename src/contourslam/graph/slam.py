@@ -13,11 +13,11 @@ from contourslam.geometry.poses import between, between_one, compose, compose_on
 from contourslam.graph.doubt import DoubtTree
 from contourslam.graph.landmarks import NOTHING, Landmarks
 from contourslam.graph.loops import LoopFinder, Tie
-from contourslam.graph.matches import ROBUST_TIES, match_information
-from contourslam.graph.places import Keyframe, Places
+from contourslam.graph.places import ROBUST_TIES, Keyframe, Places
 from contourslam.graph.pose_graph import PoseGraph, poses_of, spreads
 from contourslam.graph.refine import refine
 from contourslam.landmarks import trace
+from contourslam.matching.certainty import exposure
 from contourslam.matching.odometry import LENGTH, ContourOdometry, Step
 from contourslam.matching.oriented import move, oriented_points
 from contourslam.matching.small import invert, moved, turned
@@ -32,7 +32,8 @@ ROBUST_WHEELS = 1.0  # width of the Cauchy kernel, in standard deviations
 # of incidence) adds up along a wall, beyond what the noise of the points explains.
 HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
-REFRESH = 50  # keyframes after which the places are asked anew where they are
+UPDATE = 4  # keyframes that enter the graph together: contour odometry is as good over a metre or two
+REFRESH = 52  # keyframes after which the places are asked anew where they are
 STEPS_AFTER_LOOP = 5
 
 
@@ -83,6 +84,7 @@ class GraphSlam:
         self._settled: tuple[gtsam.NonlinearFactorGraph, gtsam.Values] | None = None  # the graph, refined
         self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
         self._ties: list[tuple[int, Tie]] = []
+        self._tie_covariances: list[Floats] = []
         self._nodes: dict[int, int] = {}
         self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
@@ -117,7 +119,8 @@ class GraphSlam:
         oriented = move(oriented_points(contours), self.mount)
         increment, noise = self._wheels.step_or_guess(scan.stamp, motion, self._last_step, self._last_elapsed)
         before = self._contour.pose
-        step = self._contour.push(oriented, increment, noise)
+        exposed = exposure(scan.offsets, scan.stamp - self._stamp)
+        step = self._contour.push(oriented, increment, noise, exposed)
         self._last_step, self._last_elapsed = between_one(before, step.pose), scan.stamp - self._stamp
         self._stamp = scan.stamp
         self._since, self._since_noise = moved(self._since, self._since_noise, increment, noise)
@@ -125,7 +128,8 @@ class GraphSlam:
         count = NOTHING
         if step.keyframe is not None:
             self._settled = None
-            self._add_keyframe(step.keyframe, step, Keyframe(scan.stamp, step.pose, oriented.astype(np.float32)))
+            kept = Keyframe(scan.stamp, step.pose, oriented.astype(np.float32), self._contour.blur)
+            self._add_keyframe(step.keyframe, step, kept)
             self._lap("graph")
             node = self._nodes[step.anchor]
             count = self._landmarks.take(scan, contours, step.keyframe, self._key_pose, node, self._graph, self._lap)
@@ -180,14 +184,14 @@ class GraphSlam:
 
     def _loops(self) -> tuple[Loop, ...]:
         loops = []
-        for keyframe, tie in self._ties:
+        for (keyframe, tie), covariance in zip(self._ties, self._tie_covariances, strict=True):
             place = self._places.list[tie.place]
             loops.append(
                 Loop(
                     earlier_stamp=self._keyframes[place.anchor].stamp,
                     later_stamp=self._keyframes[keyframe].stamp,
                     relative_pose=tie.alignment.pose,
-                    covariance=invert(match_information(tie.alignment.information, tie.alignment.pose[2])),
+                    covariance=covariance,
                     shift=tie.shift,
                     method=tie.method,
                     pairs=tie.alignment.pairs,
@@ -210,19 +214,21 @@ class GraphSlam:
         else:
             wheel_noise = turned(self._since_noise, -self._since[2])
             graph.relate(key - 1, key, self._since, invert(wheel_noise + 1e-8 * np.eye(3)), ROBUST_WHEELS)
-            if step.alignment is not None:
-                information = match_information(step.alignment.information, step.pose[2])
-                graph.relate(step.anchor, key, between_one(keyframes[step.anchor].local, step.pose), information)
+            if step.match is not None:
+                seen = between_one(keyframes[step.anchor].local, step.pose)
+                graph.relate(step.anchor, key, seen, invert(step.match))
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._travelled += math.hypot(step.pose[0] - last[0], step.pose[1] - last[1])
         self._grow_tree(step, pose)
         closed = self.config.graph.loops and self._tie(key, step, pose)
-        graph.update(STEPS_AFTER_LOOP if closed else 0)
-        self._key_pose = graph.pose(key)
+        if closed or key % UPDATE == 0 or step.finished is not None:
+            graph.update(STEPS_AFTER_LOOP if closed else 0)
+            pose = graph.pose(key)
+        self._key_pose = pose
         if closed:
             self._landmarks.refresh()
         if closed or key % REFRESH == 0:
-            self._places.move(np.array([graph.pose(p.anchor) for p in self._places.list]).reshape(-1, 3))
+            self._places.move(graph.poses([p.anchor for p in self._places.list]))
         if step.finished is not None:
             anchor = step.finished.anchor
             self._places.add(step.finished, self._nodes[anchor], graph.pose(anchor))
@@ -238,10 +244,11 @@ class GraphSlam:
             found = self._finder.search(patch, step.pose, pose, unsure, key, self._travelled)
         for keyframe, tie in found:
             place, seen = self._places.list[tie.place], tie.alignment.pose
-            information = match_information(tie.alignment.information, seen[2])
-            self._graph.relate(place.anchor, keyframe, seen, information, ROBUST_TIES, tie=True)
+            covariance = self._places.match_covariance(tie.place, keyframe, seen)
+            self._graph.relate(place.anchor, keyframe, seen, invert(covariance), ROBUST_TIES, tie=True)
             self._ties.append((keyframe, tie))
-            self._doubt.better(node, place.node, pose, turned(invert(information), pose[2]))
+            self._tie_covariances.append(covariance)
+            self._doubt.better(node, place.node, pose, turned(covariance, pose[2]))
         return any(tie.method != "nearby" for _, tie in found)
 
     def _grow_tree(self, step: Step, pose: Floats) -> None:
