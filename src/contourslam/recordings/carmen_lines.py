@@ -40,9 +40,18 @@ def beam_angles(count: int) -> Floats:
     ndarray, shape (count,)
         rad, from -pi/2, counter-clockwise.
     """
-    angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count, endpoint=count % 2 == 1)
+    # A copy, for what owns its numbers and is read-only is shared by the scans.
+    angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count, endpoint=count % 2 == 1).copy()
     angles.flags.writeable = False
     return angles
+
+
+@lru_cache(maxsize=32)
+def _at_once(count: int) -> Floats:
+    """Time offsets of beams that count as simultaneous: zeros, shared by all scans."""
+    offsets = np.zeros(count)
+    offsets.flags.writeable = False
+    return offsets
 
 
 def _odometry(stamp: bytes, pose: list[bytes]) -> Odometry:
@@ -68,7 +77,7 @@ def parse_flaser(line: bytes) -> Parsed:
         raise ValueError(WRONG_COUNT)
     ranges = parse_numbers(words[2] if len(words) == 3 else b"", _beam_count(words[1], line))
     odometry = _odometry(tail[6], tail[3:6])
-    scan = LaserScan(odometry.stamp, beam_angles(ranges.size), ranges, np.zeros(ranges.size), 0.0, _NO_RETURN)
+    scan = LaserScan(odometry.stamp, beam_angles(ranges.size), ranges, _at_once(ranges.size), 0.0, _NO_RETURN)
     return odometry, scan
 
 
@@ -87,7 +96,7 @@ def parse_robotlaser(line: bytes) -> Parsed:
     ranges = parse_numbers(b" ".join(words[9 : 9 + count]), count)
     limit = max_range if 0.0 < max_range < _NO_RETURN else _NO_RETURN
     angles = start + resolution * np.arange(count, dtype=np.float64)
-    return odometry, LaserScan(odometry.stamp, angles, ranges, np.zeros(count), 0.0, limit)
+    return odometry, LaserScan(odometry.stamp, angles, ranges, _at_once(count), 0.0, limit)
 
 
 def laser_pose(line: bytes) -> Floats:

@@ -1,5 +1,6 @@
 """One turn of a 2-D lidar, each beam with its own angle and its own time."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,21 +42,38 @@ class LaserScan:
 
     def __post_init__(self) -> None:
         for name in ("angles", "ranges", "offsets"):
-            values = np.array(getattr(self, name), dtype=np.float64)
-            values.flags.writeable = False
-            object.__setattr__(self, name, values)
+            values = getattr(self, name)
+            if not _unchanging(values):
+                values = np.array(values, dtype=np.float64)
+                values.flags.writeable = False
+                object.__setattr__(self, name, values)
         shape = self.ranges.shape
         if len(shape) != 1 or self.angles.shape != shape or self.offsets.shape != shape:
             raise ScanError(
                 f"scan at stamp {self.stamp}: angles {self.angles.shape}, ranges {shape} and offsets "
                 f"{self.offsets.shape} must be vectors of one length"
             )
-        if not (np.isfinite(self.stamp) and np.isfinite(self.angles).all() and np.isfinite(self.offsets).all()):
+        if not (math.isfinite(self.stamp) and all_finite(self.angles) and all_finite(self.offsets)):
             raise ScanError(f"scan at stamp {self.stamp}: a stamp, angle or time offset is not finite")
         if not 0.0 <= self.range_min < self.range_max:
             raise ScanError(
                 f"scan at stamp {self.stamp}: range limits [{self.range_min}, {self.range_max}] m are not a range"
             )
+
+
+def _unchanging(values: object) -> bool:
+    """Whether an array may be shared, as the angles of all scans of a log are: nobody can write to it."""
+    return (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and not values.flags.writeable
+        and bool(values.flags.owndata)
+    )
+
+
+def all_finite(values: NDArray[np.float64]) -> bool:
+    """Whether no value of a vector is NaN or infinite; where all are, this takes a tenth of the usual way."""
+    return math.isfinite(values.dot(values)) or bool(np.isfinite(values).all())
 
 
 def evenly_spaced(

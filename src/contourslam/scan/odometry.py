@@ -1,11 +1,13 @@
 """What the wheels say: the pose of the base in a frame that drifts."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.errors import ScanError
+from contourslam.scan.laser_scan import all_finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +27,7 @@ class Odometry:
 
     def __post_init__(self) -> None:
         pose = np.array(self.pose, dtype=np.float64)
-        if pose.shape != (3,) or not np.isfinite(pose).all() or not np.isfinite(self.stamp):
+        if pose.shape != (3,) or not all_finite(pose) or not math.isfinite(self.stamp):
             raise ScanError(f"odometry at stamp {self.stamp}: pose must be three finite numbers, got {self.pose!r}")
         pose.flags.writeable = False
         object.__setattr__(self, "pose", pose)
