@@ -97,17 +97,25 @@ class PoseGraph:
         self._new = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
 
+    def _catch_up(self) -> None:
+        """Take in what waits, so that everything can be asked for."""
+        if self._new.size() > 0:
+            self.update()
+
     def pose(self, key: int) -> Floats:
         """Estimate of one variable."""
+        self._catch_up()
         return to_array(self._isam.calculateEstimatePose2(key))
 
     def poses(self, keys: Sequence[int]) -> Floats:
         """Estimates of several variables, shape (n, 3)."""
+        self._catch_up()
         values = self._isam.calculateEstimate()
         return np.array([to_array(values.atPose2(key)) for key in keys]).reshape(-1, 3)
 
     def estimate(self, count: int) -> gtsam.Values:
         """Estimate of the keyframes 0 to `count` - 1."""
+        self._catch_up()
         return keyframes_of(self._isam.calculateEstimate(), count)
 
 
