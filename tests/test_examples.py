@@ -12,7 +12,7 @@ SAYS = {
     "01_corners_of_one_scan.py": "curvature_scale_space: 6 corners",
     "02_streaming_slam.py": "map: ",
     "03_a_fifth_detector.py": "turning angle   RMSE",
-    "04_map_a_recording.py": "map.geojson, map.pgm, map.png, map.yaml",
+    "04_map_a_recording.py": "map.geojson, map.pgm, map.svg, map.yaml",
     "05_compare_two_detectors.py": "teh_chin        walls",
 }
 

@@ -184,7 +184,9 @@ def _result(
             readings = OdometryReadings(rows[:, 0], compose(slam.start_pose, between(origin, rows[:, 1:])), before)
     watch.start()
     finished = slam.finish()
-    watch("refinement")
+    watch("map refinement")  # "refinement" alone is that of corners
+    corners, walls = slam.corner_map(), slam.wall_map()
+    watch("map")
     quality = [u.quality for u in updates if u.quality is not None]
     counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64).reshape(-1, 4)
     return RunResult(
@@ -199,8 +201,8 @@ def _result(
         matched_count=counts[:, 0],
         corner_count=counts[:, 1],
         wall_count=counts[:, 2],
-        corner_map=slam.corner_map(),
-        wall_map=slam.wall_map(),
+        corner_map=corners,
+        wall_map=walls,
         seconds=watch.seconds,
         skipped=skipped,
         complete=complete,
