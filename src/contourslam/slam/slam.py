@@ -29,7 +29,7 @@ from contourslam.slam.wheels import Wheels
 SLIP = np.diag([0.5**2, 0.5**2, np.radians(10.0) ** 2])
 SLIP_PAIRS = 3
 # With contour matching, landmarks are looked for after this way, m, or rad turned, and not before ...
-LOOK_EVERY = 0.1
+LOOK_EVERY = 0.2
 # ... and what they are measured wrong by, a wall by its bends and frames and by the angle at which the beams meet it,
 # changes over this one: a filter that takes all the looks for independent believes a bent wall against its heading.
 INDEPENDENT = 1.0

@@ -14,7 +14,8 @@ from contourslam.slam.odometry_buffer import OdometryBuffer
 SHORTEST = 0.1  # two scans are taken to lie at least this far apart (s) where a speed is asked for: stamps jitter
 LONGEST = 1.0  # nor do they count as farther apart than this (s) where motion is guessed: nobody goes on for long
 MOST_CHANGE = 1.5  # nor is a step guessed more than this much longer or shorter than the last one
-STALE = 0.5  # readings that end this long before the scan (s) say nothing about it
+STALE = 0.5  # readings that end this long before the scan (s) say nothing about it ...
+SILENT, MOST_SILENT = 0.5, 10.0  # ... unless that is less than this part of the time between scans far apart (s)
 # Without wheels, standard deviations of the velocity that a robot has beside that of the last step: m/s, m/s, rad/s.
 CRUISE = np.array([0.2, 0.2, 0.5])
 
@@ -90,7 +91,7 @@ class Wheels:
         """
         elapsed = stamp - self._stamp
         known = self.step(stamp, motion)
-        if known is not None and (motion[0][-1] > -STALE or elapsed > LONGEST):
+        if known is not None and motion[0][-1] > -max(STALE, SILENT * min(elapsed, MOST_SILENT)):
             return known
         if not math.isfinite(elapsed):
             return np.zeros(3), np.diag((CRUISE * SHORTEST) ** 2)
