@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contourslam.config import Config
 from contourslam.contour.contours import Contours, Floats, Ints
 from contourslam.detectors import Detector
-from contourslam.geometry.poses import compose_one
+from contourslam.geometry.poses import between_one, compose_one
 from contourslam.graph.association import NONE, WIDE_GATES, associate, near
 from contourslam.graph.doubt import DoubtTree
 from contourslam.graph.landmark_factors import LANDMARK, bind
@@ -45,6 +45,7 @@ FORGET_AFTER = 15  # keyframes without another sighting after which a landmark i
 # A landmark not seen from places known this sharply from here is not asked: its twin is found once the loop is closed.
 SHARP, SHARP_ANGLE = 0.10, math.radians(3.0)
 MARGIN = 3.0  # m by which landmarks may have moved since they were read
+SHIFT, LEVER = 0.03, 5.0  # m the robot, or what lies so far ahead, has moved when landmarks are read anew
 # What iSAM2 gets while the drive goes on: every so many keyframes the newest sighting of each landmark, and only for a
 # while after its birth. Landmarks that tie distant parts of the drive together make each further step of iSAM2 several
 # times dearer and the poses no better, for contours tie those parts already; all sightings go into the refinement.
@@ -126,6 +127,7 @@ class Landmarks:
         self._ids, self._observed, self._failed, self._last, self._node = (np.full(64, -1) for _ in range(5))
         self._until = np.full(64, -1)
         self._stale = np.zeros(64, np.bool_)  # moved in the graph since it was read
+        self._shifted = 0.0
         self._used = 0
         self._making: dict[int, list[int]] = {}  # rows in the making, with the sightings so far
         self._waiting: list[tuple[int, int]] = []  # sightings that are to enter the graph, with their landmark's row
@@ -165,8 +167,8 @@ class Landmarks:
         first = self.sightings.append(key, rows)
         world = to_world(rows, np.zeros(len(rows), np.int64), pose[None])
         around = near(self.table, self._used, pose[0], pose[1], self._config.lidar.max_range + MARGIN)
-        self._read(around[self._stale[around]], graph)
         live = around[self._sharp(around, node, pose)]
+        self._read(live[self._stale[live]], graph)
         chosen = associate(world, self.table, live, WIDE_GATES)
         matched, born = self._recognise(world, chosen, first, key, node)
         missed = self._count_missed(scan, pose, live, key)
@@ -209,9 +211,23 @@ class Landmarks:
             self._mapped = poses.copy(), to_maps(found, ids[kept], failed[kept], at, known.reshape(-1, 3, 3))
         return self._mapped[1]
 
-    def refresh(self) -> None:
-        """Say that much of the graph has moved: each landmark is read anew from it when it is next come by."""
-        self._stale[:] = True
+    def refresh(self, before: Floats, after: Floats) -> None:
+        """Say how the graph has moved the robot: if far, each landmark is read anew from it when it is next come by."""
+        step = between_one(before, after)
+        self._shifted += math.hypot(step[0], step[1]) + LEVER * abs(step[2])
+        if self._shifted > SHIFT:
+            self._shifted = 0.0
+            self._stale[:] = True
+
+    def seen(self, *, since: int) -> Ints:
+        """Rows of the landmarks, those in the making too, that keyframe `since` or a later one saw."""
+        used = slice(self._used)
+        return np.flatnonzero((self.table[used, KIND] >= 0.0) & (self._last[used] >= since))
+
+    def not_seen(self, *, since: int) -> Ints:
+        """Rows of the landmarks of the map that neither keyframe `since` nor a later one saw."""
+        used = slice(self._used)
+        return np.flatnonzero((self._ids[used] >= 0) & (self._last[used] < since))
 
     def _read(self, rows: Ints, graph: PoseGraph) -> None:
         """Take over where the graph has these landmarks."""
@@ -223,10 +239,12 @@ class Landmarks:
 
     def _sharp(self, rows: Ints, node: int, pose: Floats) -> NDArray[np.bool_]:
         """Which rows were last seen from places that are known sharply from here."""
-        nodes, which = np.unique(self._node[rows], return_inverse=True)
+        sharp = np.zeros(self._doubt.count, np.bool_)
+        sharp[self._node[rows]] = True
+        nodes = np.flatnonzero(sharp)
         doubt = self._doubt.between(node, nodes, pose)
-        sharp = (doubt[:, 0, 0] + doubt[:, 1, 1] < SHARP**2) & (doubt[:, 2, 2] < SHARP_ANGLE**2)
-        return np.asarray(sharp[which])
+        sharp[nodes] = (doubt[:, 0, 0] + doubt[:, 1, 1] < SHARP**2) & (doubt[:, 2, 2] < SHARP_ANGLE**2)
+        return sharp[self._node[rows]]
 
     def _recognise(
         self, world: Floats, chosen: Ints, first: int, key: int, node: int

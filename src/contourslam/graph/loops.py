@@ -9,10 +9,14 @@ from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between_one, compose_one, inverse
+from contourslam.graph.constellations import constellation, recognise
 from contourslam.graph.doubt import DoubtTree
+from contourslam.graph.landmarks import Landmarks
 from contourslam.graph.places import Places
+from contourslam.graph.sightings import X, Y
 from contourslam.matching.align import Alignment, align
 from contourslam.matching.cell_map import CellMap
+from contourslam.matching.odometry import LocalMap
 from contourslam.matching.oriented import move
 from contourslam.matching.search import search
 from contourslam.matching.search_grid import build_search_grid
@@ -51,7 +55,7 @@ class Tie:
     shift : ndarray, shape (3,)
         From where it was thought to be, in the keyframe's frame.
     method : str
-        "nearby" or "search".
+        "nearby", "constellation" or "search".
     runner_up : float
         Score of the best other pose as a part of this one's.
     """
@@ -93,10 +97,11 @@ class LoopFinder:
     ----------
     places : Places
     doubt : DoubtTree
+    landmarks : Landmarks
     """
 
-    def __init__(self, places: Places, doubt: DoubtTree) -> None:
-        self._places, self._doubt = places, doubt
+    def __init__(self, places: Places, doubt: DoubtTree, landmarks: Landmarks) -> None:
+        self._places, self._doubt, self._landmarks = places, doubt, landmarks
         self._waiting: list[_Look] = []
         self._searched_at = -math.inf
         self._looked: deque[int] = deque(maxlen=2 * MOST_PLACES)
@@ -149,14 +154,14 @@ class LoopFinder:
         return found
 
     def search(
-        self, patch: CellMap, local: Floats, pose: Floats, unsure: Candidates, keyframe: int, travelled: float
+        self, patch: LocalMap, local: Floats, pose: Floats, unsure: Candidates, keyframe: int, travelled: float
     ) -> list[tuple[int, Tie]]:
         """Look for what was seen of late in places that may be near.
 
         Parameters
         ----------
-        patch : CellMap
-            Contours of the last metres, in the frame of the contour odometry.
+        patch : LocalMap
+            The last metres.
         local, pose : ndarray, shape (3,)
             The robot in that frame, and where it is thought to be in the world.
         unsure : Candidates
@@ -175,11 +180,12 @@ class LoopFinder:
             return []
         self._searched_at = travelled
         self._waiting = [w for w in self._waiting if travelled - w.travelled < FORGET]
-        points = move(patch.points[:, :4], inverse(local))
+        since = patch.anchor
+        points = move(patch.cells.points[:, :4], inverse(local))
         points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
         looks = []
         for i in self._turn(unsure.numbers):
-            tie = self._find(int(unsure.numbers[i]), points, pose, unsure.doubts[i])
+            tie = self._find(int(unsure.numbers[i]), points, pose, unsure.doubts[i], since)
             if tie is None:
                 continue
             world = self._places.out_of(tie.place, tie.alignment.pose)
@@ -206,9 +212,8 @@ class LoopFinder:
         self._looked.extend(int(numbers[i]) for i in chosen)
         return chosen
 
-    def _find(self, number: int, points: Floats, pose: Floats, doubt: Floats) -> Tie | None:
-        """Search one place, with its neighbours, for the patch; None where nothing fits, or two poses do."""
-        self.searches += 1
+    def _find(self, number: int, points: Floats, pose: Floats, doubt: Floats, since: int) -> Tie | None:
+        """Look for the patch in one place and its neighbours; None where nothing fits, or two poses do."""
         window = np.minimum(3.0 * np.sqrt(np.diag(doubt)) + (0.3, 0.3, 0.05), WINDOW)
         window[:2] = window[:2].max()
         guess = self._places.into(number, pose)
@@ -217,15 +222,34 @@ class LoopFinder:
         known = known[(np.abs(known[:, :2] - guess[:2]) < reach).all(axis=1)]
         if not len(known) or not len(points):
             return None
-        grid = build_search_grid(known[:, :2], known[:, 2:])
-        some = points[:: max(len(points) // PATCH_POINTS, 1)]
-        results = search(grid, some[:, :2], guess, window, normals=some[:, 2:], min_score=LEAST_SCORE, keep=2)
-        rival = results[1].score / results[0].score if len(results) > 1 else 0.0
-        if not results or rival > MOST_RIVAL:
-            return None
         cells = CellMap(guess, reach)
         cells.insert(known, np.zeros(3))
-        aligned = align(points, cells, results[0].pose, FREE)
-        if aligned.overlap < LEAST_PATCH_OVERLAP:
-            return None
-        return Tie(number, aligned, between_one(guess, aligned.pose), "search", rival)
+        for method, propose in (("constellation", self._by_landmarks), ("search", self._by_contours)):
+            found = propose(number, points, known, pose, window, since)
+            if found is not None:
+                aligned = align(points, cells, found[0], FREE)
+                if aligned.overlap >= LEAST_PATCH_OVERLAP:
+                    return Tie(number, aligned, between_one(guess, aligned.pose), method, found[1])
+        return None
+
+    def _by_landmarks(
+        self, number: int, points: Floats, known: Floats, pose: Floats, window: Floats, since: int
+    ) -> tuple[Floats, float] | None:
+        """Pose seen from the place that corners and walls propose, and how good the next one is beside it."""
+        table, old = self._landmarks.table, self._landmarks.not_seen(since=since)
+        near = np.abs(table[old][:, [X, Y]] - pose[:2]).max(axis=1) < PATCH_RADIUS + window[0]
+        local = constellation(table, self._landmarks.seen(since=since), pose)
+        found = recognise(local, constellation(table, old[near], np.zeros(3)), pose, window)
+        return None if found is None else (self._places.into(number, found[0].pose), found[1])
+
+    def _by_contours(
+        self, number: int, points: Floats, known: Floats, pose: Floats, window: Floats, since: int
+    ) -> tuple[Floats, float] | None:
+        """Pose seen from the place that a search over all poses finds, and how good the next one is beside it."""
+        self.searches += 1
+        grid = build_search_grid(known[:, :2], known[:, 2:])
+        some = points[:: max(len(points) // PATCH_POINTS, 1)]
+        guess = self._places.into(number, pose)
+        results = search(grid, some[:, :2], guess, window, normals=some[:, 2:], min_score=LEAST_SCORE, keep=2)
+        rival = results[1].score / results[0].score if len(results) > 1 else 0.0
+        return None if not results or rival > MOST_RIVAL else (results[0].pose, rival)

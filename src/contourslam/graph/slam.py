@@ -78,11 +78,11 @@ class GraphSlam:
         self._graph = PoseGraph()
         self._keyframes: list[Keyframe] = []
         self._places, self._doubt = Places(self._keyframes, lidar.max_range + LENGTH), DoubtTree()
-        self._finder = LoopFinder(self._places, self._doubt)
         # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
         self._scans: list[tuple[int, Floats, Floats]] = []
         self._settled: tuple[gtsam.NonlinearFactorGraph, gtsam.Values] | None = None  # the graph, refined
         self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
+        self._finder = LoopFinder(self._places, self._doubt, self._landmarks)
         self._ties: list[tuple[int, Tie]] = []
         self._tie_covariances: list[Floats] = []
         self._nodes: dict[int, int] = {}
@@ -223,10 +223,9 @@ class GraphSlam:
         closed = self.config.graph.loops and self._tie(key, step, pose)
         if closed or key % UPDATE == 0 or step.finished is not None:
             graph.update(STEPS_AFTER_LOOP if closed else 0)
+            self._landmarks.refresh(pose, graph.pose(key))
             pose = graph.pose(key)
         self._key_pose = pose
-        if closed:
-            self._landmarks.refresh()
         if closed or key % REFRESH == 0:
             self._places.move(graph.poses([p.anchor for p in self._places.list]))
         if step.finished is not None:
@@ -240,8 +239,7 @@ class GraphSlam:
         sharp, unsure = self._finder.candidates(pose, node)
         found = [(key, tie) for tie in self._finder.ties(self._keyframes[key].oriented, pose, sharp)]
         if not found and self._contour.active is not None:
-            patch = self._contour.active.cells
-            found = self._finder.search(patch, step.pose, pose, unsure, key, self._travelled)
+            found = self._finder.search(self._contour.active, step.pose, pose, unsure, key, self._travelled)
         for keyframe, tie in found:
             place, seen = self._places.list[tie.place], tie.alignment.pose
             covariance = self._places.match_covariance(tie.place, keyframe, seen)
