@@ -93,7 +93,7 @@ def test_landmarks_enter_the_graph_in_batches_and_are_read_from_it(drive: Drive)
         drive.visit(pose)
     before = drive.landmarks.table.copy()
     drive.visit((0.0, 0.0, 0.0))
-    drive.landmarks.refresh()
+    drive.landmarks.refresh(np.zeros(3), np.array([0.1, 0.0, 0.0]))
     drive.visit((0.1, 0.0, 0.0))
     changed = drive.landmarks.table - before
     changed[:, DIRECTION] = wrap(changed[:, DIRECTION])
