@@ -16,7 +16,8 @@ COMMANDS = {
     "simulate": "Simulate a robot in a furnished room and record it.",
     "info": "Say what is in a recording and what is missing to map it.",
     "detect": "Draw one scan: contours, responses, corners and walls.",
-    "run": "Map a recording: trajectory, corners, walls, occupancy grid.",
+    "run": "Map a recording: trajectory, corners, walls.",
+    "grid": "Render the occupancy grid of a mapped recording.",
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare the landmark detectors and write the report.",
 }

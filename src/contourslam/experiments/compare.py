@@ -151,7 +151,7 @@ def compare(
     lidar = simulation.lidar
     if simulation.noise is not None:
         lidar = replace(lidar, sigma_range=simulation.noise, sigma_relative=0.0)
-    config = told(config or Config(), lidar)
+    config = told(config or Config(back_end="ekf"), lidar)
     wanted = tuple(variants(detectors))
     tasks = [
         _Task(room, seed, wanted, config, simulation, None if i else recording, keep=i == 0)
