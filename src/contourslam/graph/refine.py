@@ -41,9 +41,10 @@ def refine(
     Returns
     -------
     factors : gtsam.NonlinearFactorGraph
-        Of all that was solved at last.
+        Of all that was solved at last, but those of landmarks: for marginals, which change little by them and would
+        take ten times as long.
     values : gtsam.Values
-        Of the keyframes and the landmarks.
+        Of the keyframes.
     """
     count = len(keyframes)
     factors = joined(graph.factors, graph.ties)
@@ -52,10 +53,9 @@ def refine(
         poses = poses_of(values, count)
         places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
         seen, landmarks = relations(find_landmark_set(sightings, poses), sightings, poses)
-        start = keyframes_of(values, count)
-        start.insert(landmarks)
-        factors = joined(graph.factors, _ties(keyframes, poses, places), seen)
-        values = solve(factors, start)
+        landmarks.insert(values)
+        factors = joined(graph.factors, _ties(keyframes, poses, places))
+        values = keyframes_of(solve(joined(factors, seen), landmarks), count)
     return factors, values
 
 
