@@ -13,13 +13,13 @@ from contourslam.detectors import Detector
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.graph.association import NONE, WIDE_GATES, associate, near
 from contourslam.graph.doubt import DoubtTree
+from contourslam.graph.landmark_expected import expected
 from contourslam.graph.landmark_factors import LANDMARK, bind
 from contourslam.graph.landmark_maps import judge, records, to_maps
 from contourslam.graph.landmark_set import find_landmark_set
 from contourslam.graph.pose_graph import PoseGraph
 from contourslam.graph.sightings import (
     COLUMNS,
-    CONVEX,
     DIRECTION,
     END,
     KIND,
@@ -35,10 +35,8 @@ from contourslam.kernels import kernel
 from contourslam.landmarks import find_landmarks
 from contourslam.landmarks.detect import Lap
 from contourslam.scan import LaserScan
-from contourslam.slam import measurement
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import CORNER
-from contourslam.slam.visibility import expected_in_scan
 
 FREE = -1.0  # kind of a row of the table that holds nothing
 FORGET_AFTER = 15  # keyframes without another sighting after which a landmark in the making is given up
@@ -78,23 +76,6 @@ def _refresh(seen: Floats, landmark: Floats, observed: int) -> None:
     along = tx * (seen[X] - landmark[X]) + ty * (seen[Y] - landmark[Y])
     landmark[START] = min(landmark[START], along + seen[START])
     landmark[END] = max(landmark[END], along + seen[END])
-
-
-@kernel
-def _for_visibility(table: Floats, rows: Ints) -> tuple[Floats, Floats]:
-    """These landmarks as :func:`expected_in_scan` takes them."""
-    mean, out = np.zeros(3 + 2 * rows.size), np.zeros((rows.size, measurement.COLUMNS))
-    for k in range(rows.size):
-        row = table[rows[k]]
-        out[k, measurement.KIND], out[k, measurement.DIRECTION] = row[KIND], row[DIRECTION]
-        out[k, measurement.OPENING], out[k, measurement.CONVEX] = row[OPENING], row[CONVEX]
-        out[k, measurement.START], out[k, measurement.END] = row[START], row[END]
-        if row[KIND] == CORNER:
-            mean[3 + 2 * k], mean[4 + 2 * k] = row[X], row[Y]
-        else:
-            mean[3 + 2 * k] = row[DIRECTION]
-            out[k, measurement.ANCHOR_X], out[k, measurement.ANCHOR_Y] = row[X], row[Y]
-    return mean, out
 
 
 class Landmarks:
@@ -244,7 +225,7 @@ class Landmarks:
         nodes = np.flatnonzero(sharp)
         doubt = self._doubt.between(node, nodes, pose)
         sharp[nodes] = (doubt[:, 0, 0] + doubt[:, 1, 1] < SHARP**2) & (doubt[:, 2, 2] < SHARP_ANGLE**2)
-        return sharp[self._node[rows]]
+        return np.asarray(sharp[self._node[rows]])
 
     def _recognise(
         self, world: Floats, chosen: Ints, first: int, key: int, node: int
@@ -316,18 +297,7 @@ class Landmarks:
     def _count_missed(self, scan: LaserScan, pose: Floats, live: Ints, key: int) -> tuple[int, ...]:
         """Count a miss for each landmark that the scan should have shown; returns their ids."""
         rows = live[(self._ids[live] >= 0) & (self._last[live] != key)]
-        angles, ranges = scan.angles, scan.ranges
-        if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
-            way = np.argsort(angles, kind="stable")
-            angles, ranges = angles[way], ranges[way]
-        least = self._config.landmarks
-        mean, table = _for_visibility(self.table, rows)
-        should = expected_in_scan(
-            mean, table, len(rows), compose_one(pose, self._mount), angles, ranges,
-            min(self._config.lidar.max_range, scan.range_max), least.min_side, least.min_side_points, least.min_wall,
-            least.min_wall_points,
-        )  # fmt: skip
-        missed = rows[should]
+        missed = rows[expected(self.table, rows, scan, compose_one(pose, self._mount), self._config)]
         self._failed[missed] += 1
         ids: list[int] = self._ids[missed].tolist()
         for number in ids:
