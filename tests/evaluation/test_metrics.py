@@ -12,8 +12,9 @@ from contourslam.geometry.poses import compose
 
 KEYS = {
     "back_end", "loops", "quality",
-    "detector", "scans", "complete", "skipped", "rmse", "online_rmse", "odometry_rmse", "ate", "rpe", "nees", "nees_inside",
-    "inside_two_sigma", "nis", "nis_inside", "fnr", "fnr_median", "fnr_walls", "fnr_walls_median", "landmarks",
+    "detector", "scans", "complete", "skipped", "rmse", "online_rmse", "odometry_rmse", "ate", "rpe", "nees",
+    "nees_inside", "inside_two_sigma", "nis", "nis_inside", "fnr", "fnr_median", "fnr_walls",
+    "fnr_walls_median", "landmarks",
     "per_scan", "seconds", "scans_per_second",
 }  # fmt: skip
 
