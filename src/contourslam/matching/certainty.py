@@ -21,6 +21,7 @@ from contourslam.matching.small import invert, turned
 
 WIDTH = 0.05  # of the robust kernel, m: the last one of the alignment
 PUSH, PUSH_ANGLE = 0.01, 0.003  # m, rad: about what an alignment errs by
+SURE = 4.0  # information that could be chance, at this many times its variance, is none
 BLOCKS = 6  # parts of a scan that err independently
 LEAST = 0.002**2  # m^2: no surface is truer to its line than this
 # What a match leaves open where the contours say nothing (m, m, rad), so that its covariance is finite, ...
@@ -109,6 +110,40 @@ def _scatter(pulls: Floats, parts: Floats, whole: Floats) -> float:
 
 
 @kernel
+def _sandwich(a: Floats, m: Floats) -> Floats:
+    """A M A for the symmetric part of A; spelled out, for Numba's own product of matrices needs SciPy."""
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for n in range(3):
+                    out[i, j] += 0.25 * (a[i, k] + a[k, i]) * m[k, n] * (a[n, j] + a[j, n])
+    return out
+
+
+@kernel
+def _temper(information: Floats, chance: Floats) -> None:
+    """Take from the information about the position what may be chance, direction by direction; in place.
+
+    A push ahead and one back differ by chance alone where a wall is straight, for then each finds other partners.
+    """
+    angle = 0.5 * math.atan2(2.0 * information[0, 1], information[0, 0] - information[1, 1])
+    c, s = math.cos(angle), math.sin(angle)
+    for x, y in ((c, s), (-s, c)):
+        known = x * x * information[0, 0] + 2.0 * x * y * information[0, 1] + y * y * information[1, 1]
+        doubtful = SURE * (x * x * chance[0, 0] + 2.0 * x * y * chance[0, 1] + y * y * chance[1, 1])
+        less = 1.0 - math.sqrt(max(1.0 - doubtful / max(known, 1e-12), 0.0))
+        for i in range(3):  # S I S with S = 1 - less u u^T
+            along = x * information[0, i] + y * information[1, i]
+            information[0, i] -= less * x * along
+            information[1, i] -= less * y * along
+        for i in range(3):
+            along = x * information[i, 0] + y * information[i, 1]
+            information[i, 0] -= less * x * along
+            information[i, 1] -= less * y * along
+
+
+@kernel
 def _hold(
     index: Tiles, tiles: Tiles, rows: Floats, x0: float, y0: float, oriented: Floats, pose: Floats, sightings: float
 ) -> tuple[Floats, float]:  # fmt: skip
@@ -121,7 +156,10 @@ def _hold(
     for b in range(BLOCKS):
         whole += parts[b]
     variance = max(_scatter(pulls, parts, whole), alone, LEAST)
-    growth, ahead, behind, none = np.empty((3, 3)), np.empty((1, 3)), np.empty((1, 3)), np.empty((0, 3, 3))
+    growth, chance = np.empty((3, 3)), np.empty((3, 3))
+    here, ahead, behind, none = np.zeros(3), np.empty((1, 3)), np.empty((1, 3)), np.empty((0, 3, 3))
+    for b in range(BLOCKS):
+        here += pulls[b]
     for i in range(3):
         size = PUSH_ANGLE if i == 2 else PUSH
         pushed = pose.copy()
@@ -131,16 +169,11 @@ def _hold(
         pull(index, tiles, rows, x0, y0, oriented, pushed, sightings, behind, none)
         for j in range(3):
             growth[i, j] = (ahead[0, j] - behind[0, j]) / (2.0 * size)
-    growth = 0.5 * (growth + growth.T)
-    # Products are spelled out: Numba's own need SciPy.
+            chance[i, j] = (ahead[0, j] + behind[0, j] - 2.0 * here[j]) / (2.0 * size)
     inverse = invert(whole)
-    out = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                for m in range(3):
-                    out[i, j] += growth[i, k] * inverse[k, m] * growth[m, j] / variance
-    return turned(out, -pose[2]), variance
+    out = _sandwich(growth, inverse)
+    _temper(out, _sandwich(chance, inverse))
+    return turned(out / variance, -pose[2]), variance
 
 
 @kernel
