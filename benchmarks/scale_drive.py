@@ -4,7 +4,6 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -19,8 +18,7 @@ from contourslam.simulation.long_drive import LongDrive, Message, building_drive
 from contourslam.slam.result import RunResult, ScanUpdate
 
 WARM_UP = 3000  # messages, which compile what has to be compiled
-CONFIG = Config()
-CONFIG = replace(CONFIG, slam=replace(CONFIG.slam, walls=True))
+CONFIG = Config(back_end="graph")
 
 
 def mapped(

@@ -109,7 +109,7 @@ class Landmarks:
         self._until = np.full(64, -1)
         self._stale = np.zeros(64, np.bool_)  # moved in the graph since it was read
         self._shifted = 0.0
-        self._used = 0
+        self._used = self._bound = 0
         self._making: dict[int, list[int]] = {}  # rows in the making, with the sightings so far
         self._waiting: list[tuple[int, int]] = []  # sightings that are to enter the graph, with their landmark's row
         self._in_graph: set[int] = set()
@@ -149,13 +149,15 @@ class Landmarks:
         world = to_world(rows, np.zeros(len(rows), np.int64), pose[None])
         around = near(self.table, self._used, pose[0], pose[1], self._config.lidar.max_range + MARGIN)
         live = around[self._sharp(around, node, pose)]
-        self._read(live[self._stale[live]], graph)
+        if graph.settled:  # else a step of iSAM2 would be due for each of them
+            self._read(live[self._stale[live]], graph)
         chosen = associate(world, self.table, live, WIDE_GATES)
         matched, born = self._recognise(world, chosen, first, key, node)
         missed = self._count_missed(scan, pose, live, key)
         lap("association")
         dropped = self._drop(live, key)
-        if key % BATCH == 0:
+        if graph.settled and key >= self._bound + BATCH:
+            self._bound = key
             self._bind(graph)
         lap("landmarks")
         return Count(len(found.corners), len(found.walls), matched, missed, born, dropped)

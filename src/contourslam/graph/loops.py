@@ -24,7 +24,7 @@ from contourslam.matching.small import invert, turned
 
 APART = 3  # finished places that are passed over, for the robot has hardly left them
 REACH = 4.0  # a place whose middle is this near may see what the robot sees, m
-MOST_TIES = 2  # places tied to one keyframe
+MOST_TIES = 1  # places tied to one keyframe
 SHARP, SHARP_ANGLE = 0.15, math.radians(4.0)  # standard deviations up to which a scan is aligned without a search
 LEAST_SIGMA = np.array([0.05, 0.05, math.radians(1.0)])  # what the doubt is never taken to be less than
 GATE = 16.0  # squared Mahalanobis distance by which a tie may shift the pose

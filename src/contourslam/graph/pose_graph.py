@@ -97,6 +97,11 @@ class PoseGraph:
         self._new = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
 
+    @property
+    def settled(self) -> bool:
+        """True where nothing waits for the next update."""
+        return bool(self._new.size() == 0)
+
     def _catch_up(self) -> None:
         """Take in what waits, so that everything can be asked for."""
         if self._new.size() > 0:

@@ -33,8 +33,10 @@ ROBUST_WHEELS = 1.0  # width of the Cauchy kernel, in standard deviations
 HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
 UPDATE = 4  # keyframes that enter the graph together: contour odometry is as good over a metre or two
+UPDATE_LATER = 600  # keyframes after which one more waits: a step of iSAM2 gets dearer as the graph grows
 REFRESH = 52  # keyframes after which the places are asked anew where they are
-STEPS_AFTER_LOOP = 5
+STEPS_AFTER_LOOP = 1
+TIE_PAUSE = 0.45  # m after a tie to an old place in which another would say little more
 
 
 class GraphSlam:
@@ -89,7 +91,8 @@ class GraphSlam:
         self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
-        self._travelled = 0.0
+        self._travelled, self._tied_at = 0.0, -math.inf
+        self._due = 0  # keyframe at which the graph is updated next
         self._lap = lap
 
     def push_odometry(self, odometry: Odometry) -> None:
@@ -221,7 +224,8 @@ class GraphSlam:
         self._travelled += math.hypot(step.pose[0] - last[0], step.pose[1] - last[1])
         self._grow_tree(step, pose)
         closed = self.config.graph.loops and self._tie(key, step, pose)
-        if closed or key % UPDATE == 0 or step.finished is not None:
+        if closed or key >= self._due:
+            self._due = key + UPDATE + key // UPDATE_LATER
             graph.update(STEPS_AFTER_LOOP if closed else 0)
             self._landmarks.refresh(pose, graph.pose(key))
             pose = graph.pose(key)
@@ -230,15 +234,20 @@ class GraphSlam:
             self._places.move(graph.poses([p.anchor for p in self._places.list]))
         if step.finished is not None:
             anchor = step.finished.anchor
-            self._places.add(step.finished, self._nodes[anchor], graph.pose(anchor))
+            back = between_one(step.pose, keyframes[anchor].local)
+            self._places.add(step.finished, self._nodes[anchor], compose_one(pose, back))
         self._key_covariance = self._doubt.from_start(self._nodes[step.anchor], self._key_pose)
 
     def _tie(self, key: int, step: Step, pose: Floats) -> bool:
         """Tie a keyframe to old places; True where a loop was closed that a search had to find."""
         node = self._nodes[step.anchor]
         sharp, unsure = self._finder.candidates(pose, node)
+        if len(sharp.numbers) and self._travelled < self._tied_at + TIE_PAUSE:
+            return False
         found = [(key, tie) for tie in self._finder.ties(self._keyframes[key].oriented, pose, sharp)]
-        if not found and self._contour.active is not None:
+        if found:
+            self._tied_at = self._travelled
+        elif self._contour.active is not None:
             found = self._finder.search(self._contour.active, step.pose, pose, unsure, key, self._travelled)
         for keyframe, tie in found:
             place, seen = self._places.list[tie.place], tie.alignment.pose
