@@ -222,11 +222,11 @@ class LoopFinder:
         known = known[(np.abs(known[:, :2] - guess[:2]) < reach).all(axis=1)]
         if not len(known) or not len(points):
             return None
-        cells = CellMap(guess, reach)
-        cells.insert(known, np.zeros(3))
         for method, propose in (("constellation", self._by_landmarks), ("search", self._by_contours)):
             found = propose(number, points, known, pose, window, since)
             if found is not None:
+                cells = CellMap(guess, reach)
+                cells.insert(known, np.zeros(3))
                 aligned = align(points, cells, found[0], FREE)
                 if aligned.overlap >= LEAST_PATCH_OVERLAP:
                     return Tie(number, aligned, between_one(guess, aligned.pose), method, found[1])
