@@ -30,7 +30,7 @@ class Compare:
     output: Output = Path("comparison")
     overwrite: Overwrite = False
     room: str = "furnished_room"
-    """Room to drive through: furnished_room, office_corridor or large_hall."""
+    """Room to drive through: furnished_room, office_corridor, large_hall or office_building."""
     seeds: int = 10
     """How many drives; their seeds are 0, 1, 2, ..."""
     detectors: tuple[str, ...] = DETECTORS

@@ -24,7 +24,7 @@ class Simulate:
     """Folder of the recording to write."""
     overwrite: Overwrite = False
     room: str = "furnished_room"
-    """Room to drive through: furnished_room, office_corridor or large_hall."""
+    """Room to drive through: furnished_room, office_corridor, large_hall or office_building."""
     seed: int = 0
     """Seed of everything that chance decides: start, friction, odometry, noise."""
     duration: float | None = None
