@@ -15,7 +15,6 @@ from contourslam.report.figures.save import save_figure
 from contourslam.report.figures.scan import scan_figure
 from contourslam.report.figures.style import COLOURS, LABELS, colour
 from contourslam.report.figures.world import world_figure
-from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
 
 
@@ -73,19 +72,8 @@ def test_a_run_that_hardly_began_is_drawn(tmp_path, make_run, scans):
         corner_map=EMPTY_CORNERS,
         wall_map=EMPTY_WALLS,
     )
-    save_figure(world_figure(run, grid=OccupancyGrid()), tmp_path / "map.png")
+    save_figure(world_figure(run), tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 1000
-
-
-def test_the_occupancy_grid_lies_under_the_map_where_it_belongs(make_run):
-    grid = OccupancyGrid(0.5)
-    grid.add(np.array([[0.1, 0.1]]), np.array([[5.9, 3.9]]))
-    (image,) = world_figure(make_run(), grid=grid).axes[0].get_images()
-    assert image.get_extent() == [0.0, 6.0, 0.0, 4.0]
-    assert image.origin == "lower"
-    colours = image.get_array()
-    assert colours[0, 0].tolist() == [255, 255, 255]  # free: the beam began here
-    assert (colours[-1, -1] < 100).all()  # occupied: it ended here
 
 
 def test_the_errors_are_wrapped_and_bounded_by_two_sigma(make_run):

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from contourslam.report.figures.style import BLUE, FAINT, GREY, INK, ORANGE, VERMILION, label, styled
-from contourslam.report.occupancy import FREE, OCCUPIED, OccupancyGrid
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 
@@ -24,7 +23,6 @@ _MAX_POINTS = 2000
 def world_figure(
     result: RunResult,
     *,
-    grid: OccupancyGrid | None = None,
     segments: Floats | None = None,
     circles: Floats | None = None,
     title: str | None = None,
@@ -35,8 +33,6 @@ def world_figure(
     ----------
     result : RunResult
         The run; one that was interrupted is marked in the title.
-    grid : OccupancyGrid, optional
-        Laid under the map.
     segments : ndarray, shape (n, 2, 2), optional
         End points of the true room's surfaces at the lidar's height, m.
     circles : ndarray, shape (m, 3), optional
@@ -50,12 +46,6 @@ def world_figure(
     """
     figure = Figure(layout="constrained")
     axes = figure.add_subplot()
-    if grid is not None:
-        cells, (x, y) = grid.cells()
-        rows, columns = cells.shape
-        extent = (x, x + columns * grid.resolution, y, y + rows * grid.resolution)
-        # As colours and not as numbers: scaled down, thin walls are averaged and not lost.
-        axes.imshow(_colours(cells), extent=extent, interpolation="antialiased", origin="lower")
     _draw_room(axes, segments, circles)
     if len(result.stamps):
         _draw_way(axes, result)
@@ -70,12 +60,6 @@ def world_figure(
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower left", ncols=3)
     return figure
-
-
-def _colours(cells: NDArray[np.int8]) -> NDArray[np.uint8]:
-    """Red, green, blue of each cell: dark occupied, white free, light grey unknown."""
-    grey = np.where(cells == OCCUPIED, 60, np.where(cells == FREE, 255, 228)).astype(np.uint8)
-    return np.repeat(grey[:, :, None], 3, axis=2)
 
 
 def _thinned(points: Floats) -> Floats:
