@@ -80,7 +80,7 @@ class GraphSlam:
         self._graph = PoseGraph()
         self._keyframes: list[Keyframe] = []
         self._places, self._doubt = Places(self._keyframes, lidar.max_range + LENGTH), DoubtTree()
-        # Of each scan: its keyframe, its pose seen from there, and the covariance of that.
+        # Of each scan: its keyframe, its pose seen from there, and its covariance in the world as known at the time.
         self._scans: list[tuple[int, Floats, Floats]] = []
         self._settled: tuple[gtsam.NonlinearFactorGraph, gtsam.Values] | None = None  # the graph, refined
         self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
@@ -138,8 +138,8 @@ class GraphSlam:
             count = self._landmarks.take(scan, contours, step.keyframe, self._key_pose, node, self._graph, self._lap)
         seen = between_one(self._keyframes[-1].local, step.pose)
         pose = compose_one(self._key_pose, seen)
-        self._scans.append((len(self._keyframes) - 1, seen, step.covariance))
         covariance = self._key_covariance + turned(step.covariance, pose[2] - step.pose[2])
+        self._scans.append((len(self._keyframes) - 1, seen, covariance))
         return ScanUpdate(
             scan.stamp, pose, covariance, count.corners, count.walls, count.matched, count.missed, count.born,
             count.dropped, 0.0, 0, step.quality,
@@ -165,12 +165,15 @@ class GraphSlam:
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
         self._graph.update()  # what the last keyframe added
-        values = self._graph.estimate(len(self._keyframes))
+        count = len(self._keyframes)
+        values, covariances = self._graph.estimate(count), [covariance for _, _, covariance in self._scans]
         if self.config.graph.refine:
             factors, values = refine(self._graph, self._keyframes, self._places, self._landmarks.sightings)
             self._settled = factors, values
-        poses = self._along(poses_of(values, len(self._keyframes)))
-        return Finished(poses, np.array([c for _, _, c in self._scans]), self._loops())
+            poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
+            still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map
+            covariances = [moved(poses[key], marginals[key], seen, still)[1] for key, seen, _ in self._scans]
+        return Finished(self._along(poses_of(values, count)), np.array(covariances), self._loops())
 
     def _along(self, keys: Floats) -> Floats:
         """Poses of all scans between those of the keyframes: carried on from the one before, and to the one after."""
