@@ -118,15 +118,15 @@ def test_two_rooms_that_look_alike_leave_the_loop_open() -> None:
     assert len(lonely.look(SECOND, np.zeros(3), 4.0, 103.0, 11)) == 2
 
 
-def test_a_room_that_looks_half_alike_is_named_as_the_runner_up() -> None:
-    half = contours(APART)
-    scene = Scene(contours(), half[: len(half) * 6 // 10])
+def test_a_room_that_looks_partly_alike_is_named_as_the_runner_up() -> None:
+    other = contours(APART)
+    scene = Scene(contours(), other[: len(other) * 8 // 10])
     scene.look(FIRST, np.zeros(3), 4.0, 100.0, 10)
     found = scene.look(SECOND, np.zeros(3), 4.0, 103.0, 11)
     assert len(found) == 2
     for (_, tie), true in zip(found, (FIRST, SECOND), strict=True):
         assert np.abs(between(true, tie.alignment.pose)).max() < 0.02
-        assert 0.4 < tie.runner_up < module.MOST_RIVAL
+        assert 0.8 <= tie.runner_up < module.MOST_RIVAL  # worse ones are not looked for
 
 
 def test_a_double_beyond_the_doubt_is_not_taken_for_the_room() -> None:
