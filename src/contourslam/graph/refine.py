@@ -24,7 +24,7 @@ PRIOR = np.diag(1.0 / SIGMA**2)
 
 
 def refine(
-    graph: PoseGraph, keyframes: list[Keyframe], places: Places, sightings: Sightings
+    graph: PoseGraph, keyframes: list[Keyframe], places: Places | None, sightings: Sightings
 ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     """Solve the graph at once, tie every keyframe anew to the places around it and to all landmarks, and solve again.
 
@@ -33,8 +33,8 @@ def refine(
     graph : PoseGraph
         Stays as it is.
     keyframes : list of Keyframe
-    places : Places
-        Are moved to where they come to lie.
+    places : Places or None
+        Are moved to where they come to lie; None to tie no keyframe to a place seen before.
     sightings : Sightings
         Of corners and walls.
 
@@ -51,16 +51,16 @@ def refine(
     values = solve(factors, graph.estimate(count))
     for _ in range(ROUNDS):
         poses = poses_of(values, count)
-        places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
         seen, landmarks = relations(find_landmark_set(sightings, poses), sightings, poses)
         landmarks.insert(values)
-        factors = joined(graph.factors, _ties(keyframes, poses, places))
+        factors = joined(graph.factors) if places is None else joined(graph.factors, _ties(keyframes, poses, places))
         values = keyframes_of(solve(joined(factors, seen), landmarks), count)
     return factors, values
 
 
 def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.NonlinearFactorGraph:
     """Ties of all keyframes to the nearest places of other passes, place by place: each one's table is made once."""
+    places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
     ties = gtsam.NonlinearFactorGraph()
     chosen = _pairs(poses, places)
     for number in np.unique(chosen[:, 1]).tolist():

@@ -35,7 +35,7 @@ START = np.full(3, 1e-4)  # standard deviations of the pose in the world where t
 UPDATE = 4  # keyframes that enter the graph together: contour odometry is as good over a metre or two
 UPDATE_LATER = 600  # keyframes after which one more waits: a step of iSAM2 gets dearer as the graph grows
 REFRESH = 52  # keyframes after which the places are asked anew where they are
-STEPS_AFTER_LOOP = 1
+STEPS_AFTER_LOOP, STEPS_AT_LAST = 1, 5  # further steps of iSAM2
 TIE_PAUSE = 0.45  # m after a tie to an old place in which another would say little more
 
 
@@ -164,11 +164,12 @@ class GraphSlam:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
         if not self._scans:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
-        self._graph.update()  # what the last keyframe added
+        self._graph.update(STEPS_AT_LAST)  # what the last keyframe added, and what the loops have not yet moved
         count = len(self._keyframes)
         values, covariances = self._graph.estimate(count), [covariance for _, _, covariance in self._scans]
         if self.config.graph.refine:
-            factors, values = refine(self._graph, self._keyframes, self._places, self._landmarks.sightings)
+            places = self._places if self.config.graph.loops else None
+            factors, values = refine(self._graph, self._keyframes, places, self._landmarks.sightings)
             self._settled = factors, values
             poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
             still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map

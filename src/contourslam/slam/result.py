@@ -72,7 +72,8 @@ class Loop:
     overlap : float
         Part of the later scan's contour points that found a partner, in [0, 1].
     runner_up : float
-        Score of the best other alignment as a part of this one's, in [0, 1]; near 1 the place is ambiguous.
+        Score of the best other alignment as a part of this one's, in [0, 1]; near 1 the place is ambiguous, and 0 says
+        that none came near.
     """
 
     earlier_stamp: float
