@@ -14,17 +14,6 @@ from contourslam.kernels import kernel
 SUMS = 9
 
 
-@kernel
-def _common(parents: Ints, a: int, b: int) -> int:
-    """Nearest common ancestor; a parent's number is smaller than its child's."""
-    while a != b:
-        if a > b:
-            a = parents[a]
-        else:
-            b = parents[b]
-    return a
-
-
 class DoubtTree:
     """Places, each with the one from which it is best known; changed in place."""
 
@@ -91,9 +80,18 @@ def _spread(sums: Floats, pose: Floats) -> Floats:
 
 @kernel
 def _between(parents: Ints, sums: Floats, first: int, others: Ints, pose: Floats) -> Floats:
+    """A parent's number is smaller than its child's, so the way to the root is a way down to 0."""
+    above = np.zeros(first + 1, dtype=np.bool_)  # first and what it is known from: walked once, for all the others
+    node = first
+    while node > 0:
+        above[node] = True
+        node = parents[node]
+    above[0] = True
     out = np.empty((others.size, 3, 3))
     for i in range(others.size):
-        common = _common(parents, first, others[i])
+        common = others[i]
+        while common > first or not above[common]:
+            common = parents[common]
         out[i] = _spread(sums[first] + sums[others[i]] - 2.0 * sums[common], pose)
     return out
 

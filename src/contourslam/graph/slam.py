@@ -34,6 +34,7 @@ HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
 UPDATE = 4  # keyframes that enter the graph together: contour odometry is as good over a metre or two
 UPDATE_LATER = 600  # keyframes after which one more waits: a step of iSAM2 gets dearer as the graph grows
+AT_ONCE = 0.05  # m; a loop that moves the robot by less waits for the next update
 REFRESH = 52  # keyframes after which the places are asked anew where they are
 STEPS_AFTER_LOOP, STEPS_AT_LAST = 1, 5  # further steps of iSAM2
 TIE_PAUSE = 0.45  # m after a tie to an old place in which another would say little more
@@ -92,7 +93,7 @@ class GraphSlam:
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
         self._travelled, self._tied_at = 0.0, -math.inf
-        self._due = 0  # keyframe at which the graph is updated next
+        self._due = self._refresh_due = 0  # keyframes at which the graph is updated, and the places are moved, next
         self._lap = lap
 
     def push_odometry(self, odometry: Odometry) -> None:
@@ -234,7 +235,8 @@ class GraphSlam:
             self._landmarks.refresh(pose, graph.pose(key))
             pose = graph.pose(key)
         self._key_pose = pose
-        if closed or key % REFRESH == 0:
+        if closed or key >= self._refresh_due:
+            self._refresh_due = key + REFRESH + key // REFRESH
             self._places.move(graph.poses([p.anchor for p in self._places.list]))
         if step.finished is not None:
             anchor = step.finished.anchor
@@ -243,7 +245,7 @@ class GraphSlam:
         self._key_covariance = self._doubt.from_start(self._nodes[step.anchor], self._key_pose)
 
     def _tie(self, key: int, step: Step, pose: Floats) -> bool:
-        """Tie a keyframe to old places; True where a loop was closed that a search had to find."""
+        """Tie a keyframe to old places; True where that moves the robot by so much that it cannot wait."""
         node = self._nodes[step.anchor]
         sharp, unsure = self._finder.candidates(pose, node)
         if len(sharp.numbers) and self._travelled < self._tied_at + TIE_PAUSE:
@@ -260,7 +262,7 @@ class GraphSlam:
             self._ties.append((keyframe, tie))
             self._tie_covariances.append(covariance)
             self._doubt.better(node, place.node, pose, turned(covariance, pose[2]))
-        return any(tie.method != "nearby" for _, tie in found)
+        return any(tie.method != "nearby" and math.hypot(tie.shift[0], tie.shift[1]) > AT_ONCE for _, tie in found)
 
     def _grow_tree(self, step: Step, pose: Floats) -> None:
         """Give a local map that has just been begun its node in the tree of doubt."""
