@@ -18,7 +18,7 @@ from contourslam.slam.result import OdometryReadings, RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
 Message = LaserScan | Odometry | TruePose
-BLIND = "scans before the first odometry"
+BLIND = "scans before any odometry, mapped all the same"
 
 
 class Stopwatch:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import RecordingError
 from contourslam.geometry.poses import between, compose
-from contourslam.replay import replay
+from contourslam.replay import BLIND, replay
 from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.slam import ContourSlam, RunResult, ScanUpdate
 
@@ -145,13 +145,13 @@ def test_scans_before_the_first_odometry_leave_the_raw_odometry_where_it_starts(
     expected = compose(result.poses[0], between(wheels[0], wheels))
     np.testing.assert_allclose(result.odometry[:before], np.broadcast_to(result.poses[0], (before, 3)), atol=1e-9)
     np.testing.assert_allclose(result.odometry[before:], expected, atol=1e-9)
-    assert result.skipped == {"scans before the first odometry": before}
+    assert result.skipped == {BLIND: before}
 
 
 def test_without_any_odometry_the_raw_odometry_stands_still(drive: Drive, mount: Floats) -> None:
     result = replay(scans_in(drive(10, standing_from=0)), CONFIG, lidar_mount=mount)
     np.testing.assert_array_equal(result.odometry, 0.0)
-    assert result.skipped == {"scans before the first odometry": 10}
+    assert result.skipped == {BLIND: 10}
 
 
 @pytest.mark.parametrize("scans", [1, 25])

@@ -60,6 +60,8 @@ class Run:
     """Topic of the wheel odometry; found by itself where there is only one."""
     truth_topic: str | None = None
     """Topic of the true poses; they serve the evaluation and the first pose only."""
+    ignore_odometry: Flag = False
+    """Map from the scans alone, as if the robot had no wheel odometry."""
     every: int = 1
     """Use every n-th scan only."""
     max_scans: int | None = None
@@ -94,12 +96,15 @@ class Run:
         return _run(self, command)
 
 
-def _thinned(recording: "Recording", every: int, max_scans: int | None) -> "Iterator[Message]":
-    """Yield messages, every n-th scan only, until `max_scans` of these."""
-    from contourslam.scan import LaserScan
+def _chosen(recording: "Recording", options: Run) -> "Iterator[Message]":
+    """Yield messages, every n-th scan only, until so many of these, without odometry if it is to be ignored."""
+    from contourslam.scan import LaserScan, Odometry
 
     scans = used = 0
+    every, max_scans = options.every, options.max_scans
     for message in recording.messages():
+        if options.ignore_odometry and isinstance(message, Odometry):
+            continue
         if isinstance(message, LaserScan):
             scans += 1
             if (scans - 1) % every:
@@ -158,7 +163,7 @@ def _run(options: Run, command: str) -> int:
     prepare_folder(options.output, overwrite=options.overwrite)
     mount = recording.lidar_mount
     with Interrupt() as interrupt:
-        messages = UntilStopped(_thinned(recording, options.every, options.max_scans), interrupt)
+        messages = UntilStopped(_chosen(recording, options), interrupt)
         try:
             opening = _Opening(iter(messages))
             if opening.scans:  # to compile or to load the kernels is no part of the time per scan
@@ -211,7 +216,7 @@ def _grid(recording: "Recording", result: "RunResult", options: Run) -> "Occupan
     lidar = options.settings.lidar
     mount = recording.lidar_mount or (lidar.mount_x, lidar.mount_y, lidar.mount_yaw)
     with Interrupt() as interrupt:
-        messages = UntilStopped(_thinned(recording, options.every, len(result.stamps)), interrupt)
+        messages = UntilStopped(_chosen(recording, replace(options, max_scans=len(result.stamps))), interrupt)
         return run_grid(progress(messages, "message"), result, lidar_mount=np.array(mount), max_range=lidar.max_range)
 
 

@@ -61,7 +61,10 @@ class BagRecording(Recording):
                 odometry = odometry or "/tf"
                 self._odometry_frames = self._find_odometry_transform(read, odometry)
                 if not self._odometry_frames[1]:
-                    raise no_odometry(path, topics)
+                    if odometry_topic is not None:
+                        raise no_odometry(path, topics)
+                    self.notes.append(f"{no_odometry(path, topics)}; the scans alone must do")
+                    odometry = ""
             self._odometry_topic = odometry
             mount = self._find_mount(read)
         self._mirrored = mount is not None and mount.mirrored
