@@ -204,7 +204,8 @@ def read_metrics(path: Path) -> dict[str, Any]:
     try:
         metrics = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror or error}); is it in a folder that run wrote?") from error
+        reason = error.strerror or error
+        raise ResultError(f"{path}: cannot be read ({reason}); is it in a folder that run wrote?") from error
     except (ValueError, RecursionError) as error:
         raise ResultError(f"{path}: is not valid JSON ({error})") from error
     if not isinstance(metrics, dict):
