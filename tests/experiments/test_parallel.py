@@ -41,7 +41,8 @@ def test_a_stop_reaches_other_processes(work):
     observer = Observer(progress=lambda done, total: told.append(done), stopped=lambda: bool(told))
     results = list(each(work.slow_steps, "ab", steps=200, jobs=2, observer=observer))
     assert [item for item, _ in results] in (["a", "b"], ["a"], ["b"])
-    assert all(0 < done < 200 for _, done in results)
+    assert any(done > 0 for _, done in results)  # on a busy machine one process may not have begun
+    assert all(done < 200 for _, done in results)
 
 
 def test_ctrl_c_keeps_what_other_processes_have_done(work):
@@ -54,7 +55,8 @@ def test_ctrl_c_keeps_what_other_processes_have_done(work):
     results = list(each(work.slow_steps, "ab", steps=200, jobs=2, observer=Observer(progress=press)))
     assert pressed
     assert results
-    assert all(0 < done < 200 for _, done in results)
+    assert any(done > 0 for _, done in results)  # on a busy machine one process may not have begun
+    assert all(done < 200 for _, done in results)
 
 
 def test_ctrl_c_in_this_process_keeps_the_items_before(work):
