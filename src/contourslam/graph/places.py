@@ -10,6 +10,7 @@ from contourslam.geometry.poses import between, between_one, compose, compose_on
 from contourslam.matching.cell_map import CellMap
 from contourslam.matching.certainty import Hold, hold, match_covariance
 from contourslam.matching.odometry import LocalMap
+from contourslam.matching.oriented import move
 
 ROBUST_TIES = 3.0  # width of the Cauchy kernel of a tie to a place seen before, in standard deviations
 KEPT = 48  # places whose contours are held ready; those of others are put together again from their keyframes
@@ -152,8 +153,6 @@ class Places:
 
     def around(self, number: int) -> Floats:
         """Contour points of a place, the one before and the one after, in the frame of its anchor: x, y, nx, ny."""
-        from contourslam.matching.oriented import move
-
         own = self._keyframes[self.list[number].anchor].local
         rows = []
         for n in range(max(number - 1, 0), min(number + 2, len(self.list))):
