@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 
-import gtsam
 import numpy as np
 
 from contourslam.config import Config
@@ -83,7 +82,7 @@ class GraphSlam:
         self._places, self._doubt = Places(self._keyframes, lidar.max_range + LENGTH), DoubtTree()
         # Of each scan: its keyframe, its pose seen from there, and its covariance in the world as known at the time.
         self._scans: list[tuple[int, Floats, Floats]] = []
-        self._settled: tuple[gtsam.NonlinearFactorGraph, gtsam.Values] | None = None  # the graph, refined
+        self._settled: tuple[Floats, Floats] | None = None  # refined keyframes and their covariances
         self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
         self._finder = LoopFinder(self._places, self._doubt, self._landmarks)
         self._ties: list[tuple[int, Tie]] = []
@@ -157,9 +156,8 @@ class GraphSlam:
     def _map(self) -> tuple[CornerMap, WallMap]:
         if self._settled is None:
             return self._landmarks.maps(poses_of(self._graph.estimate(len(self._keyframes)), len(self._keyframes)))
-        factors, values = self._settled
-        poses = poses_of(values, len(self._keyframes))
-        return self._landmarks.maps(poses, lambda keys: spreads(factors, values, keys))
+        poses, covariances = self._settled
+        return self._landmarks.maps(poses, lambda keys: covariances[keys])
 
     def finish(self) -> Finished:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
@@ -167,15 +165,17 @@ class GraphSlam:
             return Finished(np.empty((0, 3)), np.empty((0, 3, 3)), ())
         self._graph.update(STEPS_AT_LAST)  # what the last keyframe added, and what the loops have not yet moved
         count = len(self._keyframes)
-        values, covariances = self._graph.estimate(count), [covariance for _, _, covariance in self._scans]
+        covariances = [covariance for _, _, covariance in self._scans]
         if self.config.graph.refine:
             places = self._places if self.config.graph.loops else None
             factors, values = refine(self._graph, self._keyframes, places, self._landmarks.sightings)
-            self._settled = factors, values
             poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
+            self._settled = poses, marginals
             still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map
             covariances = [moved(poses[key], marginals[key], seen, still)[1] for key, seen, _ in self._scans]
-        return Finished(self._along(poses_of(values, count)), np.array(covariances), self._loops())
+        else:
+            poses = poses_of(self._graph.estimate(count), count)
+        return Finished(self._along(poses), np.array(covariances), self._loops())
 
     def _along(self, keys: Floats) -> Floats:
         """Poses of all scans between those of the keyframes: carried on from the one before, and to the one after."""
