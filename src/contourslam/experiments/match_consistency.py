@@ -77,7 +77,7 @@ def keyframe_errors(
     found: list[Floats] = []
     stated: list[Floats] = []
     doubts: dict[int, tuple[Floats, Floats]] = {}  # of each keyframe: pose and covariance by the wheels since then
-    last, elapsed, stamp = np.zeros(3), 0.0, -math.inf
+    stamp = -math.inf
     for message in messages:
         if isinstance(message, TruePose):
             truth.append(message)
@@ -86,10 +86,11 @@ def keyframe_errors(
         else:
             motion = wheels.during(message)
             oriented = move(oriented_points(trace(message, config, motion, lidar_mount)), lidar_mount)
-            increment, noise = wheels.step_or_guess(message.stamp, motion, last, elapsed)
+            increment, noise = wheels.step_or_guess(message.stamp, motion)
             before = odometry.pose
             step = odometry.push(oriented, increment, noise, exposure(message.offsets, message.stamp - stamp))
-            last, elapsed, stamp = between_one(before, step.pose), message.stamp - stamp, message.stamp
+            wheels.went(between_one(before, step.pose))
+            stamp = message.stamp
             doubts = {k: moved(*doubt, increment, noise) for k, doubt in doubts.items() if k >= step.anchor}
             if step.keyframe is None:
                 continue

@@ -88,7 +88,7 @@ class GraphSlam:
         self._ties: list[tuple[int, Tie]] = []
         self._tie_covariances: list[Floats] = []
         self._nodes: dict[int, int] = {}
-        self._last_step, self._last_elapsed, self._stamp = np.zeros(3), 0.0, -math.inf
+        self._stamp = -math.inf
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
         self._travelled, self._tied_at = 0.0, -math.inf
@@ -120,11 +120,11 @@ class GraphSlam:
         contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         oriented = move(oriented_points(contours), self.mount)
-        increment, noise = self._wheels.step_or_guess(scan.stamp, motion, self._last_step, self._last_elapsed)
+        increment, noise = self._wheels.step_or_guess(scan.stamp, motion)
         before = self._contour.pose
         exposed = exposure(scan.offsets, scan.stamp - self._stamp)
         step = self._contour.push(oriented, increment, noise, exposed)
-        self._last_step, self._last_elapsed = between_one(before, step.pose), scan.stamp - self._stamp
+        self._wheels.went(between_one(before, step.pose))
         self._stamp = scan.stamp
         self._since, self._since_noise = moved(self._since, self._since_noise, increment, noise)
         self._lap("matching")

@@ -57,8 +57,6 @@ class ContourMotion:
 
     def __init__(self, max_range: float) -> None:
         self._odometry = ContourOdometry(max_range)
-        self._last_step: Floats = np.zeros(3)
-        self._last_elapsed, self._stamp = 0.0, -math.inf
 
     def step(self, scan: LaserScan, oriented: Floats, wheels: Wheels, motion: tuple[Floats, Floats]) -> ContourStep:
         """Motion since the last scan; none at the first.
@@ -79,12 +77,11 @@ class ContourMotion:
             Directions that the contours fix are known as well as these say, those that they leave open as well as the
             wheels say. Where nothing could be aligned it is the wheels' step with the wheels' covariance.
         """
-        increment, noise = wheels.step_or_guess(scan.stamp, motion, self._last_step, self._last_elapsed)
-        before, first = self._odometry.pose, not math.isfinite(self._stamp)
+        increment, noise = wheels.step_or_guess(scan.stamp, motion)
+        before, first = self._odometry.pose, self._odometry.keyframes == 0
         found = self._odometry.push(oriented, increment, noise)
         step = between_one(before, found.pose)
-        self._last_step, self._last_elapsed = step, scan.stamp - self._stamp
-        self._stamp = scan.stamp
+        wheels.went(step)
         moved = math.hypot(step[0], step[1]) + abs(float(step[2]))
         if first:
             return ContourStep(step, 1e-10 * np.eye(3), found.quality, False, moved)

@@ -34,6 +34,8 @@ class Wheels:
         self._at_scan: Floats | None = None
         self._stamp, self._twist = -math.inf, np.zeros(3)
         self._usual = SHORTEST  # time between two scans, s
+        self._last_step: Floats = np.zeros(3)
+        self._last_elapsed = 0.0
 
     def push(self, odometry: Odometry) -> None:
         """Take in one reading."""
@@ -73,9 +75,17 @@ class Wheels:
         self._stamp, self._twist = stamp, twist
         return increment, noise
 
-    def step_or_guess(
-        self, stamp: float, motion: tuple[Floats, Floats], last_step: Floats, last_elapsed: float
-    ) -> tuple[Floats, Floats]:
+    def went(self, step: Floats) -> None:
+        """Say how the robot moved up to the last scan after all: where the wheels fall silent it is taken to go on so.
+
+        Parameters
+        ----------
+        step : ndarray, shape (3,)
+            In the frame of the base at the scan before.
+        """
+        self._last_step = step
+
+    def step_or_guess(self, stamp: float, motion: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Motion since the last scan: the wheels', or where they are silent, that of the last step once more.
 
         Parameters
@@ -84,12 +94,9 @@ class Wheels:
             Of the scan, s.
         motion : (ndarray, ndarray)
             What :meth:`during` gave for it.
-        last_step : ndarray, shape (3,)
-            Motion between the two scans before, in the frame of the base at the first of them.
-        last_elapsed : float
-            Time between them, s.
         """
-        elapsed = stamp - self._stamp
+        elapsed, before = stamp - self._stamp, self._last_elapsed
+        self._last_elapsed = elapsed
         known = self.step(stamp, motion)
         if known is not None and motion[0][-1] > -max(STALE, SILENT * min(elapsed, MOST_SILENT)):
             return known
@@ -98,5 +105,5 @@ class Wheels:
         # Stamps given late come in bunches: five scans within a millisecond were not taken so.
         self._usual += 0.05 * (min(max(elapsed, 0.0), LONGEST) - self._usual)
         ahead = min(max(elapsed, self._usual, SHORTEST), LONGEST)
-        ratio = min(max(ahead / max(last_elapsed, self._usual, SHORTEST), 1.0 / MOST_CHANGE), MOST_CHANGE)
-        return last_step * ratio, np.diag((CRUISE * ahead) ** 2)
+        ratio = min(max(ahead / max(before, self._usual, SHORTEST), 1.0 / MOST_CHANGE), MOST_CHANGE)
+        return self._last_step * ratio, np.diag((CRUISE * ahead) ** 2)
