@@ -38,6 +38,11 @@ class LidarConfig:
     def __post_init__(self) -> None:
         _check_positive(self, "sigma_range", "max_range")
 
+    @property
+    def mount(self) -> tuple[float, float, float]:
+        """``T_base_lidar``: m, m, rad."""
+        return self.mount_x, self.mount_y, self.mount_yaw
+
 
 @dataclass(frozen=True, slots=True)
 class ContourConfig:

@@ -159,11 +159,12 @@ def test_a_keyframe_is_tied_to_a_place_only_where_its_contours_fit() -> None:
     sharp = Candidates(np.array([0]), np.diag([0.05**2, 0.05**2, 0.02**2])[None])
     seen = move(contours(), between(FIRST, np.zeros(3)))
     off = np.array([0.05, -0.04, 0.01])
-    (tie,) = scene.finder.ties(seen, compose_one(FIRST, off), sharp)
+    tie = scene.finder.tie(seen, compose_one(FIRST, off), sharp)
+    assert tie is not None
     assert np.abs(between(FIRST, tie.alignment.pose)).max() < 0.01
     assert tie.method == "nearby"
     elsewhere = move(seen * [1.0, -1.0, 1.0, -1.0], np.array([0.7, 0.3, 0.5]))  # a mirror image
-    assert scene.finder.ties(elsewhere, FIRST, sharp) == []
+    assert scene.finder.tie(elsewhere, FIRST, sharp) is None
 
 
 @cache

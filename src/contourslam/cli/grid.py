@@ -47,7 +47,7 @@ class Grid:
         stored = read_result_folder(self.folder)
         recording = open_recording(self.recording, scan_topic=self.scan_topic)
         lidar = stored.config.lidar
-        mount = recording.lidar_mount or (lidar.mount_x, lidar.mount_y, lidar.mount_yaw)
+        mount = recording.lidar_mount or lidar.mount
         with Interrupt() as interrupt:
             messages = UntilStopped(recording.messages(), interrupt)
             grid = run_grid(

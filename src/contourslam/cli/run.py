@@ -214,7 +214,7 @@ def _grid(recording: "Recording", result: "RunResult", options: Run) -> "Occupan
     from contourslam.report.run_grid import run_grid
 
     lidar = options.settings.lidar
-    mount = recording.lidar_mount or (lidar.mount_x, lidar.mount_y, lidar.mount_yaw)
+    mount = recording.lidar_mount or lidar.mount
     with Interrupt() as interrupt:
         messages = UntilStopped(_chosen(recording, replace(options, max_scans=len(result.stamps))), interrupt)
         return run_grid(progress(messages, "message"), result, lidar_mount=np.array(mount), max_range=lidar.max_range)

@@ -24,7 +24,6 @@ from contourslam.matching.small import invert, turned
 
 APART = 3  # finished places that are passed over, for the robot has hardly left them
 REACH = 4.0  # a place whose middle is this near may see what the robot sees, m
-MOST_TIES = 1  # places tied to one keyframe
 SHARP, SHARP_ANGLE = 0.15, math.radians(4.0)  # standard deviations up to which a scan is aligned without a search
 LEAST_SIGMA = np.array([0.05, 0.05, math.radians(1.0)])  # what the doubt is never taken to be less than
 GATE = 16.0  # squared Mahalanobis distance by which a tie may shift the pose
@@ -125,8 +124,8 @@ class LoopFinder:
         every = Candidates(numbers, doubts)
         return every.where(near & sharp), every.where(near & ~sharp)
 
-    def ties(self, oriented: Floats, pose: Floats, sharp: Candidates) -> list[Tie]:
-        """Align a keyframe to the old places around it whose relative pose is known sharply.
+    def tie(self, oriented: Floats, pose: Floats, sharp: Candidates) -> Tie | None:
+        """Align a keyframe to the nearest old place that fits, of those whose relative pose is known sharply.
 
         Parameters
         ----------
@@ -138,9 +137,8 @@ class LoopFinder:
 
         Returns
         -------
-        list of Tie
+        Tie or None
         """
-        found: list[Tie] = []
         for number, doubt in zip(sharp.numbers, sharp.doubts, strict=True):
             guess = self._places.into(number, pose)
             prior = invert(turned(doubt, guess[2] - pose[2]) + np.diag(LEAST_SIGMA**2))
@@ -148,10 +146,8 @@ class LoopFinder:
             off = aligned.pose - guess
             off[2] = between_one(guess, aligned.pose)[2]
             if aligned.overlap >= LEAST_OVERLAP and off @ prior @ off < GATE:
-                found.append(Tie(int(number), aligned, between_one(guess, aligned.pose), "nearby", 0.0))
-                if len(found) == MOST_TIES:
-                    break
-        return found
+                return Tie(int(number), aligned, between_one(guess, aligned.pose), "nearby", 0.0)
+        return None
 
     def search(
         self, patch: LocalMap, local: Floats, pose: Floats, unsure: Candidates, keyframe: int, travelled: float

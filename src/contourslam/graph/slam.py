@@ -72,8 +72,7 @@ class GraphSlam:
         self.config = config
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
         lidar = config.lidar
-        mount = (lidar.mount_x, lidar.mount_y, lidar.mount_yaw) if lidar_mount is None else lidar_mount
-        self.mount: Floats = np.array(mount, dtype=np.float64)
+        self.mount: Floats = np.array(lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
         self.start_pose: Floats = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64)
         self._wheels = Wheels(config.slam)
         self._contour = ContourOdometry(lidar.max_range)
@@ -250,9 +249,10 @@ class GraphSlam:
         sharp, unsure = self._finder.candidates(pose, node)
         if len(sharp.numbers) and self._travelled < self._tied_at + TIE_PAUSE:
             return False
-        found = [(key, tie) for tie in self._finder.ties(self._keyframes[key].oriented, pose, sharp)]
-        if found:
-            self._tied_at = self._travelled
+        nearby = self._finder.tie(self._keyframes[key].oriented, pose, sharp)
+        found: list[tuple[int, Tie]] = []
+        if nearby is not None:
+            self._tied_at, found = self._travelled, [(key, nearby)]
         elif self._contour.active is not None:
             found = self._finder.search(self._contour.active, step.pose, pose, unsure, key, self._travelled)
         for keyframe, tie in found:

@@ -69,7 +69,7 @@ def trace(
     Contours
     """
     lidar = config.lidar
-    mount = np.array([lidar.mount_x, lidar.mount_y, lidar.mount_yaw]) if T_base_lidar is None else T_base_lidar
+    mount = np.array(lidar.mount) if T_base_lidar is None else T_base_lidar
     points, beams = deskew(scan, valid_beams(scan, lidar.max_range), *motion, mount)
     return segment(points, scan.angles[beams], beams, scan.ranges.size, lidar.sigma_range, config.contour)
 

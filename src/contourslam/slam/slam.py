@@ -79,8 +79,7 @@ class ContourSlam:
         self.config = config
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
         lidar = config.lidar
-        mount = (lidar.mount_x, lidar.mount_y, lidar.mount_yaw) if lidar_mount is None else lidar_mount
-        self.mount: Floats = np.array(mount, dtype=np.float64)
+        self.mount: Floats = np.array(lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
         self.filter = LandmarkFilter(np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64))
         self.start_pose = self.filter.pose
         self._wheels = Wheels(config.slam)
