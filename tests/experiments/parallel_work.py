@@ -17,7 +17,7 @@ def count_to_three(item, step):
 
 def slow_steps(item, step):
     done = 0
-    while done < 2000:
+    while done < 200:
         time.sleep(0.02)
         done += 1
         if not step():

@@ -17,6 +17,14 @@ def work(monkeypatch):
     return importlib.import_module("parallel_work")
 
 
+@pytest.fixture(autouse=True)
+def ctrl_c_works():
+    """A shell ignores Ctrl-C for what it starts in the background, and Python then leaves it so."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_results_come_in_the_order_of_the_items_and_every_step_is_told(work, jobs):
     told = []
@@ -39,10 +47,9 @@ def test_a_stop_ends_the_work_after_a_step_and_keeps_what_is_done(work):
 def test_a_stop_reaches_other_processes(work):
     told = []
     observer = Observer(progress=lambda done, total: told.append(done), stopped=lambda: bool(told))
-    results = list(each(work.slow_steps, "ab", steps=2000, jobs=2, observer=observer))
+    results = list(each(work.slow_steps, "ab", steps=200, jobs=2, observer=observer))
     assert [item for item, _ in results] in (["a", "b"], ["a"], ["b"])
-    assert any(done > 0 for _, done in results)  # on a busy machine one process may not have begun
-    assert all(done < 2000 for _, done in results)
+    assert all(0 < done < 200 for _, done in results)
 
 
 def test_ctrl_c_keeps_what_other_processes_have_done(work):
@@ -52,11 +59,10 @@ def test_ctrl_c_keeps_what_other_processes_have_done(work):
             threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
 
     pressed = []
-    results = list(each(work.slow_steps, "ab", steps=2000, jobs=2, observer=Observer(progress=press)))
+    results = list(each(work.slow_steps, "ab", steps=200, jobs=2, observer=Observer(progress=press)))
     assert pressed
     assert results
-    assert any(done > 0 for _, done in results)  # on a busy machine one process may not have begun
-    assert all(done < 2000 for _, done in results)
+    assert all(0 < done < 200 for _, done in results)
 
 
 def test_ctrl_c_in_this_process_keeps_the_items_before(work):
