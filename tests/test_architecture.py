@@ -13,8 +13,8 @@ ROOT = PACKAGE.parents[1]
 
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
 GROUND = ("errors", "config", "kernels", "geometry", "scan")
-LINE = ("contour", "detectors", "landmarks", "matching", "slam", "graph", "replay")
-ORDER = (*GROUND, *LINE, "recordings", "simulation", "evaluation", "experiments", "report", "cli")
+LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "replay")
+ORDER = (*GROUND, *LINE, "live", "recordings", "simulation", "evaluation", "experiments", "report", "cli")
 EXTRAS = {"gtsam", "mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
 MAY_USE_EXTRAS = ("graph", "simulation", "evaluation", "experiments", "report")
 
