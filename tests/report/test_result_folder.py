@@ -1,8 +1,6 @@
 import dataclasses
 import itertools
 import json
-import resource
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from contourslam.errors import ContourslamError, ResultError
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.geometry.poses import interpolate
 from contourslam.recordings import read_trajectory
-from contourslam.report.atomic import write_bytes
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.result_folder import read_metrics, read_result_folder, to_json, write_result_folder
 from contourslam.report.scan_table import read_scan_table, write_scan_table
@@ -248,21 +245,6 @@ def test_metrics_must_be_an_object(tmp_path):
     (tmp_path / "metrics.json").write_text("[1]")
     with pytest.raises(ResultError, match="JSON object"):
         read_metrics(tmp_path / "metrics.json")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of a file as Linux does")
-def test_a_full_disk_is_said_and_the_old_file_stays(tmp_path):
-    path = tmp_path / "map.pgm"
-    write_bytes(path, b"old")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-    try:
-        with pytest.raises(ResultError, match=r"map\.pgm: cannot be written"):
-            write_bytes(path, b"x" * 100_000)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_where_the_folder_should_be_is_said(tmp_path, make_run):

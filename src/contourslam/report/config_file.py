@@ -6,9 +6,9 @@ import types
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
+from contourslam.atomic import write_text
 from contourslam.config import Config
 from contourslam.errors import ConfigError
-from contourslam.report.atomic import write_text
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

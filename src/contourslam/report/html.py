@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from contourslam import __version__
+from contourslam.atomic import make_folder, write_text
 from contourslam.experiments.study import Study
-from contourslam.report.atomic import make_folder, write_text
 from contourslam.report.comparison_metrics import comparison_metrics, mean, shared
 from contourslam.report.config_file import write_config
 from contourslam.report.figures.style import label

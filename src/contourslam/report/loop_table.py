@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contourslam.atomic import write_text
 from contourslam.errors import ResultError
-from contourslam.report.atomic import write_text
 from contourslam.slam.result import Loop
 
 _POSE = ("x", "y", "theta")

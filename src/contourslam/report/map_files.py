@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.atomic import write_text
 from contourslam.errors import ResultError
 from contourslam.geometry.angles import wrap
-from contourslam.report.atomic import write_text
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.report.atomic import write_bytes, write_text
+from contourslam.atomic import write_bytes, write_text
 from contourslam.report.occupancy import FREE, OCCUPIED, OccupancyGrid
 
 _BLACK, _GREY, _WHITE = 0, 205, 254

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contourslam.atomic import write_text
 from contourslam.evaluation.relations import JudgedRelations
-from contourslam.report.atomic import write_text
 
 _WHO = (("", "estimate"), ("online_", "online"), ("odometry_", "odometry"))
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam import __version__
+from contourslam.atomic import make_folder, remove, write_text
 from contourslam.config import Config
 from contourslam.errors import RecordingError, ResultError
 from contourslam.recordings.trajectories import read_trajectory, write_trajectory
-from contourslam.report.atomic import make_folder, remove, write_text
 from contourslam.report.config_file import read_config, write_config
 from contourslam.report.loop_table import read_loop_table, write_loop_table
 from contourslam.report.map_files import write_geojson

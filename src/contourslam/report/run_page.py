@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from contourslam import __version__
+from contourslam.atomic import make_folder, remove, write_text
 from contourslam.config import Config
 from contourslam.evaluation.relations import JudgedRelations
-from contourslam.report.atomic import make_folder, remove, write_text
 from contourslam.report.page.markup import page
 from contourslam.report.page.run import building, loops, matching, reproduce, timings, truth
 from contourslam.report.page.run import relations as known

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.atomic import write_text
 from contourslam.errors import ResultError
-from contourslam.report.atomic import write_text
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 

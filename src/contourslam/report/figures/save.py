@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
-from contourslam.report.atomic import replacing
+from contourslam.atomic import replacing
 from contourslam.report.figures.style import STYLE
 
 
