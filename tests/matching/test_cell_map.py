@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from contourslam.geometry.poses import compose_one
-from contourslam.matching.cell_map import CELL, REACH, TILE, CellMap, nearest
+from contourslam.matching.cell_map import CELL, MOST_POINTS, REACH, TILE, CellMap, nearest
 from contourslam.matching.oriented import move
 
 Floats = NDArray[np.float64]
@@ -101,3 +101,13 @@ def test_where_a_scan_is_taken_in_from_does_not_matter(x: float, y: float, turn:
     cells.insert(move(world, back), pose)
     np.testing.assert_allclose(cells.points[:, :4], world, atol=1e-9)
     assert cells.index.shape[0] * TILE * CELL >= 6.0
+
+
+def test_a_large_map_holds_what_the_small_one_has_no_numbers_for() -> None:
+    points = scattered(0, MOST_POINTS + 2000, 15.0)
+    small, large = CellMap(ORIGIN, 16.0), CellMap(ORIGIN, 16.0, large=True)
+    small.insert(points, ORIGIN)
+    large.insert(points, ORIGIN)
+    assert small.count == MOST_POINTS
+    assert large.count == len(points)
+    assert ask(large, *points[-1, :2]) == len(points) - 1

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from contourslam.contour.contours import Floats
 from contourslam.kernels import kernel
 
-Tiles = NDArray[np.int16]
+Tiles = NDArray[np.int16 | np.int32]
 CELL = 0.05  # m; one averaged point a cell
 REACH = 5  # cells around a point in which it may be the nearest one
 TILE = 32  # cells along the side of a tile; tiles are taken only where there are points
 MOST = 30.0  # sightings that an averaged point weighs at most, so that it follows a surface that was seen badly first
-MOST_POINTS = 32_000  # the tables hold 16 bits; a stretch of some metres sees a tenth of that
+MOST_POINTS = 32_000  # where the tables hold 16 bits; a stretch of some metres sees a tenth of that
 COLUMNS = 5  # x, y, nx, ny, sightings
 
 
@@ -62,6 +62,7 @@ def _insert(
 ) -> tuple[int, int]:  # fmt: skip
     """Average points into the rows, or append them; returns the numbers of rows and tiles used."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    most = min(rows.shape[0], MOST_POINTS) if tiles.itemsize == 2 else rows.shape[0]
     for k in range(oriented.shape[0]):
         x = pose[0] + cos * oriented[k, 0] - sin * oriented[k, 1]
         y = pose[1] + sin * oriented[k, 0] + cos * oriented[k, 1]
@@ -83,7 +84,7 @@ def _insert(
                 row[3] /= length
                 row[4] += 1.0
                 continue
-        if count == min(rows.shape[0], MOST_POINTS):
+        if count == most:
             break
         rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3], rows[count, 4] = x, y, nx, ny, 1.0
         used = _stamp(index, tiles, used, rows, count, x0, y0)
@@ -98,9 +99,9 @@ class CellMap:
     ----------
     rows : ndarray, shape (capacity, 5)
         x, y (m), unit normal, sightings; the first `count` hold.
-    index : ndarray of int16, shape (n, n)
+    index : ndarray of int, shape (n, n)
         Number of the tile that covers each square of the plane, -1 for none.
-    tiles : ndarray of int16, shape (capacity, 32, 32)
+    tiles : ndarray of int, shape (capacity, 32, 32)
         Row of the point nearest to each cell, -1 where none lies within reach.
     x0, y0 : float
         Corner of the table, m.
@@ -111,12 +112,15 @@ class CellMap:
         m.
     half_width : float
         Points farther than this from the centre, along x or y, are left out, m.
+    large : bool
+        The tables take twice the memory and hold the points of a whole building, not only `MOST_POINTS`.
     """
 
-    def __init__(self, centre: Floats, half_width: float) -> None:
+    def __init__(self, centre: Floats, half_width: float, *, large: bool = False) -> None:
         side = math.ceil(2.0 * half_width / (CELL * TILE))
-        self.index: Tiles = np.full((side, side), -1, np.int16)
-        self.tiles: Tiles = np.empty((64, TILE, TILE), np.int16)
+        number: type[np.int16 | np.int32] = np.int32 if large else np.int16
+        self.index: Tiles = np.full((side, side), -1, number)
+        self.tiles: Tiles = np.empty((64, TILE, TILE), number)
         self.rows: Floats = np.empty((1024, COLUMNS))
         self.count = self._used = 0
         self.x0 = float(centre[0]) - 0.5 * side * CELL * TILE
