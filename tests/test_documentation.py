@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from contourslam.cli import main
-from contourslam.cli.entry import COMMANDS, parse
+from contourslam.cli.entry import COMMANDS, command_class, parse
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -68,7 +68,7 @@ def test_every_command_in_a_document_parses() -> None:
     assert {line.split()[1] for line in commands} >= COMMANDS.keys() - {"compare"}
     for line in commands:
         words = shlex.split(line, comments=True)[1:]
-        assert type(parse(words)).__name__.lower() == words[0]
+        assert type(parse(words)) is command_class(words[0])
 
 
 def test_the_python_code_of_readme_runs(tmp_path: Path) -> None:

@@ -20,8 +20,9 @@ COMMANDS = {
     "grid": "Render the occupancy grid of a mapped recording.",
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare the landmark detectors and write the report.",
+    "world": "Write a simulated room as a world of Gazebo.",
 }
-"""Name of each command, and of its module here, with a summary; the module holds a class of that name, capitalised."""
+"""Name of each command with a summary; :func:`command_class` finds what it does."""
 
 _LIST = "\n".join(f"  {name:<10}{summary}" for name, summary in COMMANDS.items())
 HELP = f"""usage: contourslam COMMAND ...
@@ -89,6 +90,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return FAILED
 
 
+def command_class(name: str) -> Any:
+    """Import the class behind a command: `WarmUp` in the module `warm_up` behind ``warm-up``."""
+    words = name.split("-")
+    return getattr(import_module(f"contourslam.cli.{'_'.join(words)}"), "".join(word.capitalize() for word in words))
+
+
 def parse(arguments: Sequence[str]) -> Command:
     """Turn arguments into a command.
 
@@ -103,8 +110,7 @@ def parse(arguments: Sequence[str]) -> Command:
     if name not in COMMANDS:
         wrong = f"there is no command {name!r}; it" if name else "the command is missing; it"
         raise ConfigError(f"{wrong} must be one of {', '.join(COMMANDS)} (`contourslam --help` explains them)")
-    module: Any = import_module(f"contourslam.cli.{name}")
-    kind = getattr(module, name.capitalize())
+    kind = command_class(name)
 
     import tyro
 

@@ -75,7 +75,7 @@ def _add_room(world: Element, room: Room) -> None:
     high = 2.5 * max(room.wall_height, 0.4 * max(half))
     shine = {"directional": "true", "diffuse": "0.55 0.55 0.52", "specular": "0.1 0.1 0.1"}
     add(world, "light", pos=[*middle, high], dir=[0.35, 0.25, -1], **shine)
-    for index, wall in enumerate(_walls(room)):
+    for index, wall in enumerate(walls(room)):
         _add_box(world, wall, f"wall{index}")
     for index, piece in enumerate(room.pieces):
         if isinstance(piece, Box):
@@ -92,9 +92,9 @@ def _add_box(world: Element, box: Box, name: str) -> None:
     add(world, "geom", name=name, type="box", size=size, pos=at, euler=turned, rgba=[*box.colour, 1])
 
 
-def _walls(room: Room) -> list[Box]:
+def walls(room: Room) -> list[Box]:
     """Boxes outside the outline, one along each side of it; each box's negative y axis points outward."""
-    walls, count = [], len(room.outline)
+    found, count = [], len(room.outline)
     for index in range(count):
         before, start, end, after = (room.outline[(index + k) % count] for k in (-1, 0, 1, 2))
         dx, dy = end[0] - start[0], end[1] - start[1]
@@ -106,8 +106,8 @@ def _walls(room: Room) -> list[Box]:
         along, out = (length + right - left) / 2, _WALL / 2
         x, y = start[0] + ux * along + uy * out, start[1] + uy * along - ux * out
         yaw_deg = math.degrees(math.atan2(dy, dx))
-        walls.append(Box(x, y, length + left + right, _WALL, room.wall_height, yaw_deg, colour=_WALL_COLOUR))
-    return walls
+        found.append(Box(x, y, length + left + right, _WALL, room.wall_height, yaw_deg, colour=_WALL_COLOUR))
+    return found
 
 
 def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
