@@ -171,6 +171,55 @@ class GraphConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class LiveConfig:
+    """Live use on a robot: waiting for odometry, smoothing, saving by itself, and when something counts as a fault."""
+
+    wait: float = 0.15
+    """A scan waits at most this long for the odometry that covers its last beam, s."""
+    odometry_slack: float = 0.0
+    """Odometry that ends this much before a scan's last beam covers it all the same, s."""
+    max_waiting: int = 5
+    """More scans than this never wait; the oldest is dropped and counted."""
+    silent_after: float = 1.0
+    """A sensor that has said nothing for this long has stopped, s; scans then wait no longer for odometry."""
+    jump_back: float = 1.0
+    """Stamps that run back by this much, s, are a clock set back or a recording begun again; by less, disorder."""
+    max_speed: float = 3.0
+    """Odometry that moves faster than this, m/s, has leapt: its driver was started again."""
+    max_turn_rate_deg: float = 360.0
+    """Odometry that turns faster than this, degrees/s, has leapt."""
+    smooth_speed: float = 0.2
+    """A correction moves the published pose no faster than this, m/s; 0 publishes corrections as they are."""
+    smooth_turn_rate_deg: float = 10.0
+    """A correction turns the published pose no faster than this, degrees/s."""
+    smooth_within: float = 1.0
+    """A correction too large for the two rates above is made faster, so that it is over after this long, s ..."""
+    large_correction: float = 1.0
+    """... where it is larger than this, m ..."""
+    large_correction_deg: float = 30.0
+    """... or turns by more than this, degrees."""
+    autosave_period: float = 60.0
+    """A map is saved by itself this often while it changes, s; 0 for never."""
+    late_after: float = 0.1
+    """A pose later than this after its scan came is a fault, s."""
+    poor_quality: float = 0.3
+    """Contours that fit the map worse than this are a fault, 0 to 1."""
+    remember: float = 10.0
+    """Rates, latencies and faults are told of the last so many seconds."""
+
+    def __post_init__(self) -> None:
+        _check_positive(
+            self, "wait", "max_waiting", "silent_after", "jump_back", "max_speed", "max_turn_rate_deg",
+            "smooth_turn_rate_deg", "smooth_within", "large_correction", "large_correction_deg", "late_after",
+            "remember",
+        )  # fmt: skip
+        for name in ("odometry_slack", "smooth_speed", "autosave_period", "poor_quality"):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and 0.0 <= value < math.inf):
+                raise ConfigError(f"LiveConfig.{name} must be zero or more, got {value!r}")
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """The whole pipeline from scan to map."""
 
