@@ -38,6 +38,7 @@ AGREE, AGREE_ANGLE = 0.3, math.radians(3.0)  # two looks that put the robot this
 BETWEEN_LOOKS = 2.5  # if they lie this far apart, m: a look from where the first was taken says nothing new
 FORGET = 15.0  # m after which a first look is forgotten
 PAUSE = 1.0  # m between two searches
+REST = 4.0  # m for which a place that was searched in vain is let be
 FREE = np.diag([1.0, 1.0, 1.0])  # information of a pose that is known to a metre and a radian
 
 
@@ -104,6 +105,7 @@ class LoopFinder:
         self._waiting: list[_Look] = []
         self._searched_at = -math.inf
         self._looked: deque[int] = deque(maxlen=2 * MOST_PLACES)
+        self._in_vain: dict[int, float] = {}  # places, and how far the robot had driven when nothing was found there
         self.searches = 0
 
     def candidates(self, pose: Floats, node: int) -> tuple[Candidates, Candidates]:
@@ -177,12 +179,15 @@ class LoopFinder:
         self._searched_at = travelled
         self._waiting = [w for w in self._waiting if travelled - w.travelled < FORGET]
         since = patch.anchor
+        chosen = self._turn(unsure.numbers, travelled)
         points = move(patch.cells.points[:, :4], inverse(local))
         points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
         looks = []
-        for i in self._turn(unsure.numbers):
-            tie = self._find(int(unsure.numbers[i]), points, pose, unsure.doubts[i], since)
+        for i in chosen:
+            number = int(unsure.numbers[i])
+            tie = self._find(number, points, pose, unsure.doubts[i], since)
             if tie is None:
+                self._in_vain[number] = travelled
                 continue
             world = self._places.out_of(tie.place, tie.alignment.pose)
             look = _Look(tie, keyframe, local, world, travelled)
@@ -196,12 +201,14 @@ class LoopFinder:
         self._waiting += looks
         return []
 
-    def _turn(self, numbers: Ints) -> list[int]:
+    def _turn(self, numbers: Ints, travelled: float) -> list[int]:
         """Which of the candidates are looked at now: those that were not of late, nearest first."""
         recent = set(self._looked)
         order = sorted(range(len(numbers)), key=lambda i: int(numbers[i]) in recent)
         chosen: list[int] = []
         for i in order:
+            if travelled < self._in_vain.get(int(numbers[i]), -math.inf) + REST:
+                continue
             # Neighbours are searched together.
             if len(chosen) < MOST_PLACES and all(abs(int(numbers[i] - numbers[j])) > 1 for j in chosen):
                 chosen.append(i)
