@@ -59,6 +59,8 @@ def systems(parent: Element) -> dict[str, Element]:
     shutil.which("ign") is None, reason="needs `ign sdf`: apt-get install ignition-tools libsdformat-dev"
 )
 def test_gazebos_own_parser_takes_the_file(name: str, tmp_path: Path) -> None:
+    if not shutil.which("ign") or subprocess.run(["ign", "sdf", "--versions"], capture_output=True).returncode:
+        pytest.skip("`ign sdf` is in Debian's ignition-tools and libsdformat-dev")
     path = tmp_path / "world.sdf"
     assert main(["world", "--room", name, "-o", str(path)]) == 0
     done = subprocess.run(["ign", "sdf", "-k", str(path)], capture_output=True, text=True, check=False)
