@@ -32,12 +32,14 @@ def hall() -> Floats:
     return np.vstack([np.hstack([p, np.roll(p, -1, axis=0)]) for p in (outline, *boxes)])
 
 
-def drive(see: See, walls: Floats, poses: list[Floats], *, wheels: bool = True, seed: int = 0) -> list[Step]:
-    """Steps of the odometry along poses; the first of them is its origin."""
+def drive(
+    see: See, walls: Floats, poses: list[Floats], *, wheels: bool = True, seed: int = 0, errs: float = 0.3
+) -> list[Step]:
+    """Steps along poses, the first of them its origin; the wheels err by `errs` of what they state."""
     chance, odometry, steps, last = np.random.default_rng(seed), ContourOdometry(30.0), [], np.zeros(3)
     for before, pose in pairwise([poses[0], *poses]):
         noise = NOISE if wheels else np.diag([0.05**2, 0.05**2, math.radians(6.0) ** 2])
-        motion = between_one(before, pose) + 0.3 * np.sqrt(np.diag(NOISE)) * chance.standard_normal(3)
+        motion = between_one(before, pose) + errs * np.sqrt(np.diag(NOISE)) * chance.standard_normal(3)
         start = odometry.pose
         steps.append(odometry.push(see(walls, pose, chance, beams=180), motion if wheels else last, noise))
         last = between_one(start, steps[-1].pose)
@@ -121,6 +123,15 @@ def test_a_push_that_the_wheels_do_not_feel_is_noticed_and_undone(see: See, hall
     assert steps[0].slipped
     error = between_one(between_one(poses[0], pushed), steps[-1].pose)
     assert np.abs(error).max() < 0.05
+
+
+@pytest.mark.parametrize("errs", [0.3, 1.0, 3.0])
+def test_the_innovation_is_as_large_as_the_wheels_errors_are_beside_what_they_state(
+    see: See, hall: Floats, errs: float
+) -> None:
+    steps = drive(see, hall, way(200), seed=3, errs=errs)
+    mean = np.mean([step.nis for step in steps if step.alignment is not None and not step.slipped]) / 3.0
+    assert 0.6 * errs**2 < mean < 1.4 * errs**2 + 0.1
 
 
 def test_the_quality_drops_where_the_lidar_sees_something_else(see: See, hall: Floats) -> None:

@@ -141,7 +141,7 @@ class GraphSlam:
         self._scans.append((len(self._keyframes) - 1, seen, covariance))
         return ScanUpdate(
             scan.stamp, pose, covariance, count.corners, count.walls, count.matched, count.missed, count.born,
-            count.dropped, 0.0, 0, step.quality,
+            count.dropped, step.nis, 0 if step.alignment is None or step.slipped else 3, step.quality,
         )  # fmt: skip
 
     def corner_map(self) -> CornerMap:

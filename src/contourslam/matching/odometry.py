@@ -85,6 +85,9 @@ class Step:
         Anchor of the local map that the scan was aligned to.
     quality : float
         Overlap as a part of the usual one, at most 1; 0 where nothing was aligned.
+    nis : float
+        Normalised innovation squared, 3 degrees of freedom: the motion that the contours showed, held against the
+        wheels' and the covariance stated with it; 0 where nothing was aligned.
     slipped : bool
         True where the alignment contradicts the increment.
     keyframe : int or None
@@ -100,6 +103,7 @@ class Step:
     alignment: Alignment | None
     anchor: int
     quality: float
+    nis: float
     slipped: bool
     keyframe: int | None
     match: Floats | None
@@ -166,11 +170,11 @@ class ContourOdometry:
             if local is not None:
                 self.pose, local.covariance = moved(before, local.covariance, increment, noise)
         self._trusted = compose_one(self._trusted, increment)
-        found, quality, slipped = None, 0.0, False
+        found, quality, nis, slipped = None, 0.0, 0.0, False
         active = self.active
         if active is not None and len(oriented) >= LEAST_POINTS:
             steady = compose_one(before, self._motion)
-            found, quality, slipped = self._align(oriented, active, [self.pose, steady, self._trusted])
+            found, quality, nis, slipped = self._align(oriented, active, [self.pose, steady, self._trusted])
         self._motion = between_one(before, self.pose)
         if not slipped:
             self._trusted = self.pose
@@ -190,9 +194,11 @@ class ContourOdometry:
                 )
             finished = self._keep(oriented, distance)
         about = active or self.newest
-        return Step(self.pose, about.covariance, found, anchor, quality, slipped, keyframe, match, finished)
+        return Step(self.pose, about.covariance, found, anchor, quality, nis, slipped, keyframe, match, finished)
 
-    def _align(self, oriented: Floats, active: LocalMap, expected: list[Floats]) -> tuple[Alignment, float, bool]:
+    def _align(
+        self, oriented: Floats, active: LocalMap, expected: list[Floats]
+    ) -> tuple[Alignment, float, float, bool]:
         """Align where the wheels have the scan, and where that fits badly, elsewhere."""
         prior, slipped = invert(active.covariance), False
         found = align(oriented, active.cells, self.pose, prior)
@@ -201,12 +207,14 @@ class ContourOdometry:
             found, slipped = find_again(oriented, active.cells, expected, prior, found, enough)
         quality = min(found.overlap / max(self._usual, 0.5), 1.0)
         self._usual += 0.02 * (found.overlap - self._usual) if self._usual > 0.0 else found.overlap
+        off = found.pose - self.pose
+        off[2] = wrap_angle(off[2])
         self.pose = found.pose
         for local in (active, self._following):
             if local is not None:
                 before = LOOSE if slipped else invert(local.covariance)
                 local.covariance = invert(before + found.information)
-        return found, quality, slipped
+        return found, quality, LOOSER * float(off @ prior @ off), slipped
 
     @property
     def turn_excess(self) -> float:
