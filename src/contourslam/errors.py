@@ -21,5 +21,9 @@ class ResultError(ContourslamError):
     """A result folder is missing a file, or a result cannot be written."""
 
 
+class MapError(ContourslamError):
+    """A map file is missing, damaged or of a newer version, or a map lacks what it is needed for."""
+
+
 class MissingExtraError(ContourslamError):
     """An optional library is not installed; the message names the extra to install."""
