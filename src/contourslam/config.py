@@ -179,7 +179,7 @@ class LiveConfig:
     odometry_slack: float = 0.0
     """Odometry that ends this much before a scan's last beam covers it all the same, s."""
     max_waiting: int = 5
-    """More scans than this never wait; the oldest is dropped and counted."""
+    """More scans than this never wait for odometry, nor twice as many for the map; the oldest is dropped and counted."""
     silent_after: float = 1.0
     """A sensor that has said nothing for this long has stopped, s; scans then wait no longer for odometry."""
     jump_back: float = 1.0

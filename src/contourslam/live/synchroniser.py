@@ -33,7 +33,7 @@ class Synchroniser:
 
     A scan waits for odometry at most `wait`; not at all once none has come for `wait` since the first scan, or none for
     `silent_after` while scans came. It is then released without, and :attr:`Released.without` says why and by how much
-    the odometry is late. No more than `max_waiting` scans wait for odometry, and as many for the map: beyond the former
+    the odometry is late. No more than `max_waiting` scans wait for odometry, and twice as many in all: beyond the former
     the oldest is released without odometry, beyond the latter it is dropped.
 
     A message stamped before the one before it is dropped. Where time ran back for good (:class:`Timeline`), what still
@@ -58,15 +58,19 @@ class Synchroniser:
         self._now = -math.inf
         self._scans_since = math.nan  # arrival of the first scan of an unbroken run
         self._last_scan = self._last_reading = -math.inf  # arrivals
-        self.clear()
+        self._timeline = Timeline(config.jump_back, config.silent_after)
+        self._readings: deque[Odometry] = deque(maxlen=KEPT)
+        # Stamps of the readings since the odometry's clock was last set, whether or not they have been handed on.
+        self._first, self._newest = math.inf, -math.inf
+        self._waiting: deque[_Waiting] = deque()
+        self._ready: deque[_Waiting] = deque()
+        self._jump: TimeJump | None = None
 
     def clear(self) -> None:
         """Forget what waits and how far time has come; what was counted stays."""
         self._timeline = Timeline(self._config.jump_back, self._config.silent_after)
-        self._waiting: deque[_Waiting] = deque()
-        self._ready: deque[_Waiting] = deque()
-        self._jump: TimeJump | None = None
-        self._forget_readings()
+        self._forget()
+        self._jump = None
 
     def push_odometry(self, odometry: Odometry, now: float) -> None:
         """Take in one reading; of several with one stamp the last counts.
@@ -82,7 +86,9 @@ class Synchroniser:
             if self._readings and self._readings[-1].stamp == odometry.stamp:
                 self._readings.pop()
             self._readings.append(odometry)
-            self._first = min(self._first, odometry.stamp)
+            leap = odometry.stamp - self._newest - max(self._now - self._last_reading, 0.0)
+            if self._newest == -math.inf or leap > self._config.jump_back:  # the latter is a clock set forward
+                self._first = odometry.stamp
             self._newest = odometry.stamp
             self._last_reading = self._now
         self._move_on()
@@ -165,9 +171,7 @@ class Synchroniser:
             self._jump = jump if self._jump is None else TimeJump(source, self._jump.before, jump.after, self._now)
             for waiting in (*self._ready, *self._waiting):
                 self._count("scan", Reason.BEFORE_JUMP, waiting.scan.stamp, self._now - waiting.arrived)
-            self._ready.clear()
-            self._waiting.clear()
-            self._forget_readings()
+            self._forget()
         if verdict is Verdict.REPEATED and source == "odometry":
             self._count(source, Reason.REPLACED, stamp, 0.0)
             return True
@@ -176,10 +180,11 @@ class Synchroniser:
             return False
         return True
 
-    def _forget_readings(self) -> None:
-        self._readings: deque[Odometry] = deque(maxlen=KEPT)
-        self._first: float = math.inf  # stamps of the readings since time last ran back
-        self._newest: float = -math.inf
+    def _forget(self) -> None:
+        self._waiting.clear()
+        self._ready.clear()
+        self._readings.clear()
+        self._first, self._newest = math.inf, -math.inf
 
     def _begins_after(self, waiting: _Waiting) -> bool:
         """Whether all odometry was taken long after a scan, which can only be another clock's."""
@@ -201,7 +206,7 @@ class Synchroniser:
             if not (crowded or self._newest >= first.end or self._waits_until(first) <= self._now):
                 return
             self._ready.append(self._waiting.popleft())
-            if len(self._ready) > self._config.max_waiting:
+            if len(self._ready) + len(self._waiting) > 2 * self._config.max_waiting:
                 oldest = self._ready.popleft()
                 self._count("scan", Reason.TOO_SLOW, oldest.scan.stamp, self._now - oldest.arrived)
 

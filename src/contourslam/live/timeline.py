@@ -66,7 +66,7 @@ class Timeline:
         other = self._streams["odometry" if source == "scan" else "scan"]
         behind = stream.newest - stamp
         if stream.epoch < other.epoch:
-            if abs(stamp - other.newest) <= abs(behind):
+            if abs(stamp - other.newest) <= max(abs(behind), self._jump_back):
                 stream.newest, stream.epoch, stream.strayed = stamp, other.epoch, math.nan
                 return Verdict.NEXT, 0.0
             if now - self._jumped_at <= self._patience:
