@@ -77,17 +77,32 @@ class ContourMotion:
             Directions that the contours fix are known as well as these say, those that they leave open as well as the
             wheels say. Where nothing could be aligned it is the wheels' step with the wheels' covariance.
         """
-        increment, noise = wheels.step_or_guess(scan.stamp, motion)
-        before, first = self._odometry.pose, self._odometry.keyframes == 0
-        found = self._odometry.push(oriented, increment, noise)
-        step = between_one(before, found.pose)
-        wheels.went(step)
-        moved = math.hypot(step[0], step[1]) + abs(float(step[2]))
-        if first:
-            return ContourStep(step, 1e-10 * np.eye(3), found.quality, False, moved)
-        if found.alignment is None:
-            return ContourStep(step, noise, found.quality, False, moved)
-        prior = turned(LOOSE, -before[2]) if found.slipped else invert(noise)
-        keyframes = moved / KEY_DISTANCE
-        information = turned(found.alignment.information, -before[2]) / min(max(keyframes, LEAST / KEY_DISTANCE), 1.0)
-        return ContourStep(step, invert(prior + information) + keyframes * FLOOR, found.quality, True, moved)
+        found = step_by_contours(self._odometry, oriented, *wheels.step_or_guess(scan.stamp, motion))
+        wheels.went(found.increment)
+        return found
+
+
+def step_by_contours(
+    odometry: ContourOdometry, oriented: Floats, increment: Floats, noise: Floats, exposure: float = 0.0
+) -> ContourStep:
+    """Motion since the last scan, as :meth:`ContourMotion.step` gives it.
+
+    Parameters
+    ----------
+    odometry : ContourOdometry
+        Takes the scan in.
+    oriented, increment, noise, exposure
+        As of :meth:`ContourOdometry.push`.
+    """
+    before, first = odometry.pose, odometry.keyframes == 0
+    found = odometry.push(oriented, increment, noise, exposure)
+    step = between_one(before, found.pose)
+    moved = math.hypot(step[0], step[1]) + abs(float(step[2]))
+    if first:
+        return ContourStep(step, 1e-10 * np.eye(3), found.quality, False, moved)
+    if found.alignment is None:
+        return ContourStep(step, noise, found.quality, False, moved)
+    prior = turned(LOOSE, -before[2]) if found.slipped else invert(noise)
+    keyframes = moved / KEY_DISTANCE
+    information = turned(found.alignment.information, -before[2]) / min(max(keyframes, LEAST / KEY_DISTANCE), 1.0)
+    return ContourStep(step, invert(prior + information) + keyframes * FLOOR, found.quality, True, moved)

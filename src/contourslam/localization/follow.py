@@ -1,0 +1,272 @@
+"""The streaming object over a fixed map: each scan aligned to the map's contours, and doubt where they disagree."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour.contours import Floats
+from contourslam.detectors import Detector, make_detector
+from contourslam.geometry.angles import wrap_angle
+from contourslam.geometry.poses import between_one, compose_one
+from contourslam.landmarks import trace
+from contourslam.localization.fixed_map import make_fixed_map
+from contourslam.localization.lookout import Finder, Lookout
+from contourslam.maps import SavedMap
+from contourslam.matching.align import Alignment, align
+from contourslam.matching.certainty import exposure, hold
+from contourslam.matching.odometry import FLOOR, LEAST_POINTS, LOOSER, POOR
+from contourslam.matching.oriented import move, oriented_points
+from contourslam.matching.rescue import LOOSE, find_again
+from contourslam.matching.small import invert, moved, turned
+from contourslam.scan import LaserScan, Odometry
+from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.result import ScanUpdate
+from contourslam.slam.wheels import Wheels
+
+FIRST_DOUBT = np.array([0.5, 0.5, math.radians(15.0)])  # of a pose that somebody gives, standard deviations: m, m, rad
+USUAL = 0.85  # part of a scan that fits its map, before the drive has told
+LEAST_USUAL = 0.6  # so much of it at least, however much has changed
+LEARN = 0.02  # weight of the newest scan in what is usual
+LOST = 8  # poor scans in a row, after which the map is no longer believed
+FOUND = 3  # good scans in a row that end all doubt
+RESCUE_EVERY = 8  # poor scans after which the neighbourhood is searched once more
+# A robot that is lost finds back into the map by itself while it is known this well where it is; else it must look.
+STRAYED, STRAYED_ANGLE = 1.0, math.radians(30.0)
+# Errors of the map, and of the lidar, are the same from scan to scan at one place: a fix is soon forgotten, so that a
+# robot at rest does not come to believe that it knows more than half of its variance better than one scan says.
+FORGET = 2.0
+LEARN_TURNS = 0.01  # weight of the newest scan in what is known of the wheels' turns
+
+
+class Localizer:
+    """Follows a robot in a fixed map, by the contours of its scans; keeps :class:`contourslam.slam.mapper.Mapper`.
+
+    Parameters
+    ----------
+    saved : SavedMap
+        The map; it is not changed.
+    config : Config
+    detector : Detector, optional
+        A detector object of one's own; by default the one that the configuration names.
+    finder : Finder, optional
+        Finds the robot anywhere in the map; without it, the robot must begin near `initial_pose`.
+    initial_pose : ndarray, shape (3,), optional
+        About where the base is in the map as it starts: m, m, rad.
+    initial_covariance : ndarray, shape (3, 3), optional
+        How well that is known, in the axes of the map; half a metre and 15 degrees by default.
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    lap : callable, optional
+        Called with the name of each stage when it is done, for those who measure time; the core reads no clock.
+
+    Attributes
+    ----------
+    localized : bool
+        Whether the pose is believed: False before the robot is found, and while it is lost.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration names a detector that does not exist, or the map holds nothing to localise by.
+    """
+
+    def __init__(
+        self,
+        saved: SavedMap,
+        config: Config,
+        detector: Detector | None = None,
+        *,
+        finder: Finder | None = None,
+        initial_pose: Floats | None = None,
+        initial_covariance: Floats | None = None,
+        lidar_mount: Floats | None = None,
+        lap: Callable[[str], None] = lambda stage: None,
+    ) -> None:
+        self.config, self._saved = config, saved
+        self.detector = detector or make_detector(config.detector, adapted=config.adapted)
+        self.mount: Floats = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
+        self._map, self._finder, self._lap = make_fixed_map(saved), finder, lap
+        self._wheels = Wheels(config.slam)
+        self._stamp = -math.inf
+        self.localized = False
+        self._usual, self._poor, self._good = USUAL, LOST, 0
+        self._pose, self._covariance = self._map.anywhere()
+        self._placed = initial_pose is not None
+        if initial_pose is not None:
+            self._pose = np.array(initial_pose, np.float64)
+            given = np.diag(FIRST_DOUBT**2) if initial_covariance is None else initial_covariance
+            self._covariance = np.array(given, np.float64)
+        self._stale = np.zeros((3, 3))  # what of the last fix is to be forgotten
+        self._turn_excess = 1.0  # variance of the wheels' turns as found, as a part of what is stated of them
+        self._taught = 0
+        self._lookout: Lookout | None = self._new_lookout()
+        self._started_at = self._pose
+
+    def _new_lookout(self) -> Lookout:
+        return Lookout(self._finder, self.config.lidar.max_range, self.mount[:2])
+
+    @property
+    def start_pose(self) -> Floats:
+        """Base in the map where it started, as it was known when the robot was found first, shape (3,)."""
+        return self._started_at
+
+    @property
+    def odometry_pose(self) -> Floats:
+        """Raw odometry at the stamp of the last scan (``T_odom_base``), shape (3,); zeros before the first reading."""
+        return self._wheels.pose
+
+    def push_odometry(self, odometry: Odometry) -> None:
+        """Take in one odometry reading."""
+        self._wheels.push(odometry)
+
+    def corner_map(self) -> CornerMap:
+        """Corners of the map; they do not change."""
+        return self._saved.corners
+
+    def wall_map(self) -> WallMap:
+        """Walls of the map; they do not change."""
+        return self._saved.walls
+
+    def finish(self) -> None:
+        """Nothing is revised: the poses stay what they were at the time."""
+
+    def push_scan(self, scan: LaserScan) -> ScanUpdate:
+        """Align one scan to the map.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            Its odometry up to its last beam should have come before; what is missing is guessed from the last motion.
+
+        Returns
+        -------
+        ScanUpdate
+            Its quality is 0, and its covariance large, while the robot is not localised.
+        """
+        motion = self._wheels.during(scan)
+        contours = trace(scan, self.config, motion, self.mount)
+        self._lap("contour")
+        oriented = move(oriented_points(contours), self.mount)
+        increment, noise = self._wheels.step_or_guess(scan.stamp, motion)
+        elapsed = scan.stamp - self._stamp
+        exposed = exposure(scan.offsets, elapsed)
+        self._stamp = scan.stamp
+        turn, turn_noise = float(increment[2]), float(noise[2, 2])
+        blur = exposed * turn_noise * self._turn_excess
+        if self._lookout is None:
+            share = min((math.hypot(increment[0], increment[1]) + abs(increment[2])) / 0.1, 1.0)
+            noise = LOOSER * noise + share * FLOOR
+        else:
+            increment, noise = self._lookout.push(
+                oriented, increment, noise, exposed, elapsed if math.isfinite(elapsed) else 0.0
+            )
+        before, quality = self._pose, 0.0
+        if self._placed:
+            self._pose, self._covariance = moved(before, self._covariance + self._stale, increment, noise)
+            self._stale = np.zeros((3, 3))
+            if len(oriented) >= LEAST_POINTS:
+                quality = self._fit(oriented, before, blur)
+        if self._lookout is not None and self._poor > 0 and len(oriented) >= LEAST_POINTS:
+            self._look(oriented, blur)
+        if quality > POOR and turn_noise > 0.0:
+            self._learn(wrap_angle(self._pose[2] - before[2] - turn) ** 2 / turn_noise)
+        went = increment if not self._placed or self._lookout is not None else between_one(before, self._pose)
+        self._wheels.went(went)
+        self._lap("matching")
+        covariance = self._covariance + self._map.doubt_at(self._pose) if self._placed else self._covariance
+        return ScanUpdate(
+            scan.stamp, self._pose, covariance, 0, 0, (), (), (), (), 0.0, 0, quality if self.localized else 0.0
+        )  # fmt: skip
+
+    def _learn(self, square: float) -> None:
+        """Hold the wheels' turn, in variances of what is stated of it, against that of the map."""
+        gain = max(1.0 / (self._taught + 2.0), LEARN_TURNS)
+        self._taught += 1
+        self._turn_excess += gain * (min(square, 16.0 * self._turn_excess) - self._turn_excess)
+
+    def _enough(self) -> float:
+        """Overlap that a good fit has."""
+        return POOR * max(self._usual, LEAST_USUAL)
+
+    def _fit(self, oriented: Floats, before: Floats, blur: float) -> float:
+        """Align where the robot is expected; returns how well that fits, at most 1."""
+        prior = invert(self._covariance)
+        found = align(oriented, self._map.cells, self._pose, prior)
+        if found.overlap < self._enough():
+            self._doubt(oriented)
+            if self._poor % RESCUE_EVERY == 1 or (
+                not self.localized and self._lookout is not None and self._lookout.scans == 1
+            ):
+                found = self._rescue(oriented, before, prior, found)
+        quality = min(found.overlap / max(self._usual, LEAST_USUAL), 1.0)
+        if found.overlap >= self._enough():
+            if self.localized or self._near():
+                self._take(found, oriented, blur)
+                self._agree(found)
+            return quality
+        self._good = 0
+        if self.localized:
+            self._take(found, oriented, blur, (found.overlap / self._usual) ** 2)
+            self.localized = self._poor < LOST
+        return quality
+
+    def _near(self) -> bool:
+        """Whether a robot that is lost is known well enough to find back by itself."""
+        spread = self._covariance
+        return bool(spread[0, 0] + spread[1, 1] < STRAYED**2 and spread[2, 2] < STRAYED_ANGLE**2)
+
+    def _doubt(self, oriented: Floats) -> None:
+        """Count a poor scan; at the first one, begin to look out."""
+        self._poor += 1
+        if self._lookout is None:
+            self._lookout = self._new_lookout()
+            self._lookout.push(oriented, np.zeros(3), 1e-10 * np.eye(3), 0.0, 0.0)
+
+    def _agree(self, found: Alignment) -> None:
+        """Count a good scan; after some of them the robot is followed as ever."""
+        self._good += 1
+        if self._good >= FOUND or self.localized:
+            self.localized = True
+            self._usual += LEARN * (found.overlap - self._usual)
+        if self._good >= FOUND:
+            self._poor, self._lookout = 0, None
+
+    def _rescue(self, oriented: Floats, before: Floats, prior: Floats, poor: Alignment) -> Alignment:
+        """Search the neighbourhood; a pose that contradicts the motion must be found twice."""
+        cells = self._map.around(self._pose)
+        found, contradicts = find_again(oriented, cells, [self._pose, before], prior, poor, self._enough())
+        if contradicts and self._lookout is not None and not self._lookout.propose(found.pose):
+            return poor
+        return found
+
+    def _look(self, oriented: Floats, blur: float) -> None:
+        """Ask where in the whole map the robot is; believe it where two looks agree and the scan fits there better."""
+        if self._lookout is None:
+            return
+        pose = self._lookout.look()
+        self._lap("search")
+        if pose is None:
+            return
+        found = align(oriented, self._map.cells, pose, LOOSE)
+        if found.overlap < POOR * LEAST_USUAL:
+            return
+        if self._placed and self.localized:
+            here = align(oriented, self._map.cells, self._pose, LOOSE)
+            if here.overlap > found.overlap - 0.1:
+                return
+        if not self._placed:
+            self._started_at = compose_one(found.pose, between_one(self._lookout.pose, np.zeros(3)))
+        self._pose, self._covariance = found.pose, invert(LOOSE)
+        self._placed = self.localized = True
+        self._take(found, oriented, blur)
+        self._poor, self._good = 1, 0
+
+    def _take(self, found: Alignment, oriented: Floats, blur: float, weight: float = 1.0) -> None:
+        """Take over the pose of an alignment, with what the contours know of it."""
+        own = hold(oriented, self._map.cells, found.pose)
+        information = weight * turned(invert(own.covariance(own.variance, blur)), found.pose[2])
+        after = invert(invert(self._covariance) + information)
+        self._pose, self._covariance = found.pose, after
+        self._stale = FORGET * after @ information @ after

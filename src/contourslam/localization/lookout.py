@@ -1,0 +1,125 @@
+"""Looking where the robot is: its motion and what it sees, kept apart from the map until two looks agree."""
+
+import math
+from collections import deque
+from typing import Protocol
+
+import numpy as np
+
+from contourslam.contour.contours import Floats
+from contourslam.geometry.poses import between_one, compose_one, transform
+from contourslam.localization.view import View, view_of
+from contourslam.matching.odometry import ContourOdometry
+from contourslam.matching.oriented import move
+from contourslam.slam.contour_motion import step_by_contours
+
+AGREE, AGREE_ANGLE = 0.25, math.radians(5.0)  # m, rad: two looks closer than this say the same
+WAY = 5.0  # m of driving that a look takes in
+MOST_SCANS = 12  # nor does it take in more than these
+BROKEN = 0.6  # contours that fit those before worse than this say that the robot was carried off: all begins anew
+EAGER = 4  # looks that are taken in quick succession; later ones keep apart by more
+SOON, LATER = 0.25, 1.0  # s between the first looks, and between later ones
+REMEMBERED = 3  # looks that a new one is held against
+STILL = np.zeros(3), 1e-10 * np.eye(3)
+
+
+class Finder(Protocol):
+    """Finds a robot in a whole map."""
+
+    def find(self, view: View) -> Floats | None:
+        """Pose of the base in the map, shape (3,), where it is sure of one; None where it is not."""
+
+
+class Lookout:
+    """A drive beside the map, with the looks at the map that were taken on the way; changed in place by every scan.
+
+    Parameters
+    ----------
+    finder : Finder or None
+        None where nobody looks in the whole map.
+    max_range : float
+        No contour point lies farther from the robot than this, m.
+    lidar : ndarray, shape (2,)
+        Where the lidar sits on the base, m.
+    """
+
+    def __init__(self, finder: Finder | None, max_range: float, lidar: Floats) -> None:
+        self._finder, self._max_range, self._lidar = finder, max_range, lidar
+        self.scans = 0
+        self._looks = 0
+        self._next_look = 0.0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._odometry = ContourOdometry(self._max_range)
+        self._kept: deque[tuple[Floats, Floats]] = deque(maxlen=MOST_SCANS)
+        self._proposed: deque[Floats] = deque(maxlen=REMEMBERED)  # where the map lies, seen from the drive's own frame
+        self._newest: Floats = np.empty((0, 4))
+
+    @property
+    def pose(self) -> Floats:
+        """Of the base in the drive's own frame, shape (3,)."""
+        return self._odometry.pose
+
+    def push(
+        self, oriented: Floats, increment: Floats, noise: Floats, exposure: float, elapsed: float
+    ) -> tuple[Floats, Floats]:
+        """Take in a scan; gives its motion since the last one, and the covariance of that, as the contours have them.
+
+        Parameters
+        ----------
+        oriented, increment, noise, exposure
+            As of :meth:`contourslam.matching.odometry.ContourOdometry.push`.
+        elapsed : float
+            Since the last scan, s.
+        """
+        before = self._odometry.keyframes
+        step = step_by_contours(self._odometry, oriented, increment, noise, exposure)
+        if before and step.aligned and step.quality < BROKEN:
+            self._begin()
+            step = step_by_contours(self._odometry, oriented, *STILL)
+            self._looks, self._next_look = 0, 0.0
+        first = self._odometry.keyframes == 1 and not self._kept
+        self.scans += 1
+        self._next_look -= max(elapsed, 0.0)
+        self._newest = oriented
+        if self._odometry.keyframes > before or first:
+            self._kept.append((oriented, self.pose))
+        if first or not step.aligned:
+            return increment, noise
+        return step.increment, step.covariance
+
+    def look(self) -> Floats | None:
+        """Look in the whole map, where a look is due; gives the pose in it where this look and an earlier one agree."""
+        if self._finder is None or self._next_look > 0.0:
+            return None
+        self._looks += 1
+        self._next_look = SOON if self._looks <= EAGER else LATER
+        pose = self._finder.find(self.view())
+        return None if pose is None or not self.propose(pose) else pose
+
+    def propose(self, pose: Floats) -> bool:
+        """Say that the robot is at a pose in the map; True where it was said before, as far as it has moved since."""
+        map_from_drive = compose_one(pose, between_one(self.pose, np.zeros(3)))
+        agreed = False
+        for other in self._proposed:
+            off = between_one(compose_one(other, self.pose), pose)
+            agreed = agreed or (math.hypot(off[0], off[1]) < AGREE and abs(float(off[2])) < AGREE_ANGLE)
+        self._proposed.append(map_from_drive)
+        return agreed
+
+    def view(self) -> View:
+        """What was seen on the last metres, in the frame of the base now."""
+        points, origins = [self._newest], [np.tile(self._lidar, (len(self._newest), 1))]
+        way, last = 0.0, self.pose
+        for oriented, pose in reversed(self._kept):
+            way += math.hypot(pose[0] - last[0], pose[1] - last[1])
+            last = pose
+            if way > WAY:
+                break
+            if oriented is self._newest:
+                continue
+            seen = between_one(self.pose, pose)
+            points.append(move(oriented, seen))
+            origins.append(np.tile(transform(seen, self._lidar), (len(oriented), 1)))
+        return view_of(np.concatenate(points), np.concatenate(origins))
