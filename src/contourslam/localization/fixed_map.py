@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contourslam.contour.contours import Floats
-from contourslam.errors import ConfigError
+from contourslam.errors import MapError
 from contourslam.geometry.poses import between_one
 from contourslam.maps import SavedMap
 from contourslam.matching.cell_map import CELL, CellMap
@@ -69,14 +69,16 @@ def make_fixed_map(saved: SavedMap) -> FixedMap:
 
     Raises
     ------
-    ConfigError
+    MapError
         If the map holds neither contours nor walls.
     """
     keyframes = saved.keyframes
     if keyframes is None or not len(keyframes.points):
         faces = _faces(saved.walls)
         if not len(faces):
-            raise ConfigError("the map holds neither contours nor walls to localise by; map the place again with `run`")
+            raise MapError(
+                "the map holds neither contours nor walls to localise by; map the place again with `contourslam run`"
+            )
         cells = _table(faces[:, :2])
         cells.insert(faces, ORIGIN)
         return FixedMap(cells, np.empty((0, 3)), np.empty((0, 3, 3)))

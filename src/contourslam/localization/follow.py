@@ -11,6 +11,7 @@ from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.landmarks import trace
+from contourslam.landmarks.detect import NO_MOTION
 from contourslam.localization.fixed_map import make_fixed_map
 from contourslam.localization.lookout import Finder, Lookout
 from contourslam.maps import SavedMap
@@ -23,7 +24,7 @@ from contourslam.matching.small import invert, moved, turned
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import ScanUpdate
-from contourslam.slam.wheels import Wheels
+from contourslam.slam.wheels import CRUISE, LONGEST, Wheels
 
 FIRST_DOUBT = np.array([0.5, 0.5, math.radians(15.0)])  # of a pose that somebody gives, standard deviations: m, m, rad
 USUAL = 0.85  # part of a scan that fits its map, before the drive has told
@@ -37,6 +38,8 @@ STRAYED, STRAYED_ANGLE = 1.0, math.radians(30.0)
 # Errors of the map, and of the lidar, are the same from scan to scan at one place: a fix is soon forgotten, so that a
 # robot at rest does not come to believe that it knows more than half of its variance better than one scan says.
 FORGET = 2.0
+SILENT = 0.05  # s before a scan; odometry that ends earlier leaves open how the robot moved
+STEADY_TIMES = np.array([0.0, 1.0])  # s
 LEARN_TURNS = 0.01  # weight of the newest scan in what is known of the wheels' turns
 
 
@@ -98,6 +101,7 @@ class Localizer:
             self._pose = np.array(initial_pose, np.float64)
             given = np.diag(FIRST_DOUBT**2) if initial_covariance is None else initial_covariance
             self._covariance = np.array(given, np.float64)
+        self._steady, self._twist = NO_MOTION, np.zeros(3)  # the motion during a scan, if the robot goes on as it did
         self._stale = np.zeros((3, 3))  # what of the last fix is to be forgotten
         self._turn_excess = 1.0  # variance of the wheels' turns as found, as a part of what is stated of them
         self._taught = 0
@@ -146,11 +150,14 @@ class Localizer:
             Its quality is 0, and its covariance large, while the robot is not localised.
         """
         motion = self._wheels.during(scan)
-        contours = trace(scan, self.config, motion, self.mount)
+        elapsed = scan.stamp - self._stamp
+        silent = -float(motion[0][-1]) if len(motion[0]) else math.inf  # s between the last reading and the scan
+        contours = trace(scan, self.config, self._steady if silent > SILENT else motion, self.mount)
         self._lap("contour")
         oriented = move(oriented_points(contours), self.mount)
         increment, noise = self._wheels.step_or_guess(scan.stamp, motion)
-        elapsed = scan.stamp - self._stamp
+        if silent > SILENT:
+            noise = noise + np.diag((CRUISE * min(silent, max(elapsed, 0.0), LONGEST)) ** 2)
         exposed = exposure(scan.offsets, elapsed)
         self._stamp = scan.stamp
         turn, turn_noise = float(increment[2]), float(noise[2, 2])
@@ -174,6 +181,11 @@ class Localizer:
             self._learn(wrap_angle(self._pose[2] - before[2] - turn) ** 2 / turn_noise)
         went = increment if not self._placed or self._lookout is not None else between_one(before, self._pose)
         self._wheels.went(went)
+        if 0.0 < elapsed < LONGEST:
+            # Over two steps: of one alone, an error would come back with the other sign at each scan and not fade.
+            twist = went / elapsed
+            self._steady = STEADY_TIMES, np.stack([np.zeros(3), 0.5 * (twist + self._twist)])
+            self._twist = twist
         self._lap("matching")
         covariance = self._covariance + self._map.doubt_at(self._pose) if self._placed else self._covariance
         return ScanUpdate(
@@ -195,10 +207,9 @@ class Localizer:
         prior = invert(self._covariance)
         found = align(oriented, self._map.cells, self._pose, prior)
         if found.overlap < self._enough():
+            first = self._lookout is not None and self._lookout.scans == 1  # near where somebody says
             self._doubt(oriented)
-            if self._poor % RESCUE_EVERY == 1 or (
-                not self.localized and self._lookout is not None and self._lookout.scans == 1
-            ):
+            if first or self._poor % RESCUE_EVERY == 1:
                 found = self._rescue(oriented, before, prior, found)
         quality = min(found.overlap / max(self._usual, LEAST_USUAL), 1.0)
         if found.overlap >= self._enough():
