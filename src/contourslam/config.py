@@ -179,7 +179,7 @@ class LiveConfig:
     odometry_slack: float = 0.0
     """Odometry that ends this much before a scan's last beam covers it all the same, s."""
     max_waiting: int = 5
-    """More scans than this never wait for odometry, nor twice as many for the map; the oldest is dropped and counted."""
+    """No more scans than this wait for odometry, nor twice as many in all; then the oldest is dropped and counted."""
     silent_after: float = 1.0
     """A sensor that has said nothing for this long has stopped, s; scans then wait no longer for odometry."""
     jump_back: float = 1.0
@@ -188,9 +188,9 @@ class LiveConfig:
     """Odometry that moves faster than this, m/s, has leapt: its driver was started again."""
     max_turn_rate_deg: float = 360.0
     """Odometry that turns faster than this, degrees/s, has leapt."""
-    smooth_speed: float = 0.2
+    smooth_speed: float = 0.5
     """A correction moves the published pose no faster than this, m/s; 0 publishes corrections as they are."""
-    smooth_turn_rate_deg: float = 10.0
+    smooth_turn_rate_deg: float = 20.0
     """A correction turns the published pose no faster than this, degrees/s."""
     smooth_within: float = 1.0
     """A correction too large for the two rates above is made faster, so that it is over after this long, s ..."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
+from contourslam.geometry.poses import between, compose, inverse
 
 
 class Smoother:
@@ -24,7 +25,9 @@ class Smoother:
     """
 
     def __init__(self, config: LiveConfig) -> None:
-        self._config = config
+        self._usual = np.array([config.smooth_speed, math.radians(config.smooth_turn_rate_deg)])
+        self._large = np.array([config.large_correction, math.radians(config.large_correction_deg)])
+        self._within, self._jump_back = config.smooth_within, config.jump_back
         self.reset()
 
     def reset(self) -> None:
@@ -33,7 +36,7 @@ class Smoother:
         self._smooth: Floats = np.zeros(3)
         self._T_odom_base: Floats = np.zeros(3)
         self._time = -math.inf
-        self._speed, self._turn_rate = 0.0, 0.0
+        self._rates = self._usual
 
     def correct(self, T_map_odom: Floats, T_odom_base: Floats, time: float) -> Floats:
         """Take in a new raw value, and give the smooth one.
@@ -51,7 +54,14 @@ class Smoother:
         -------
         ndarray, shape (3,)
         """
-        raise NotImplementedError
+        if self._raw is None:
+            self._smooth, self._time = T_map_odom, time
+        self._raw, self._T_odom_base = T_map_odom, T_odom_base
+        error, _ = self._error(T_map_odom)
+        if (error > self._large).any():
+            self._rates = np.maximum(self._rates, error / self._within)
+        self.at(time)
+        return self._smooth
 
     def at(self, time: float) -> Floats | None:
         """Give the smooth value at a time; None before the first raw one.
@@ -59,6 +69,30 @@ class Smoother:
         Parameters
         ----------
         time : float
-            s; a time before the last one asked for gives what was given then.
+            s; for a time before the last one asked for, what was given then.
         """
-        raise NotImplementedError
+        if self._raw is None:
+            return None
+        elapsed = time - self._time
+        if elapsed < -self._jump_back:  # the clock was set back
+            self._time = time
+        if elapsed > 0.0:
+            self._time = time
+            self._advance(self._raw, elapsed)
+        return self._smooth
+
+    def _error(self, raw: Floats) -> tuple[Floats, Floats]:
+        """How far the robot's smooth pose is from the raw one, m and rad, and the step there."""
+        smooth = compose(self._smooth, self._T_odom_base)
+        step = between(smooth, compose(raw, self._T_odom_base))
+        return np.array([math.hypot(step[0], step[1]), abs(step[2])]), step
+
+    def _advance(self, raw: Floats, elapsed: float) -> None:
+        error, step = self._error(raw)
+        reach = self._rates * elapsed
+        if self._usual[0] == 0.0 or (error <= reach).all():
+            self._smooth, self._rates = raw, self._usual
+            return
+        part = float((reach / np.maximum(error, reach)).min())
+        smooth = compose(compose(self._smooth, self._T_odom_base), part * step)
+        self._smooth = compose(smooth, inverse(self._T_odom_base))

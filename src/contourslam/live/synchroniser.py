@@ -33,8 +33,8 @@ class Synchroniser:
 
     A scan waits for odometry at most `wait`; not at all once none has come for `wait` since the first scan, or none for
     `silent_after` while scans came. It is then released without, and :attr:`Released.without` says why and by how much
-    the odometry is late. No more than `max_waiting` scans wait for odometry, and twice as many in all: beyond the former
-    the oldest is released without odometry, beyond the latter it is dropped.
+    the odometry is late. No more than `max_waiting` scans wait for odometry, and twice as many in all: beyond the
+    former the oldest is released without odometry, beyond the latter it is dropped.
 
     A message stamped before the one before it is dropped. Where time ran back for good (:class:`Timeline`), what still
     waits is dropped, and :meth:`take` gives a :class:`TimeJump` before anything newer.
