@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
     EmitEvent,
@@ -25,7 +26,6 @@ from launch_ros.actions import Node
 
 from contourslam.simulation.config import LIDARS
 from contourslam.simulation.gazebo.robot import BASE, LIDAR
-from launch import LaunchDescription
 
 
 def generate_launch_description():

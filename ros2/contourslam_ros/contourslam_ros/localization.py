@@ -1,0 +1,53 @@
+"""Node ``localization``: tells the robot where it is in a map that is kept as it is."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+
+from contourslam.errors import ConfigError, ScanError
+from contourslam.live.session import Session
+from contourslam.live.start import localization
+from contourslam.recordings.ros_messages import POSE_COVARIANCE, odometry_from
+from contourslam_ros.live_node import LiveNode
+from contourslam_ros.running import run
+
+
+class Localization(LiveNode):
+    """The robot's pose in a known map, looked for everywhere until it is found."""
+
+    def __init__(self) -> None:
+        super().__init__("localization")
+        if not self.config.map_file:
+            raise ConfigError("localization needs a map: give its file as the parameter map_file")
+        self._guess: np.ndarray | None = None
+
+    def begin(self, mount: np.ndarray) -> Session:
+        """Localise in the map, near the first guess where there is one."""
+        return localization(
+            self.settings.core,
+            self.settings.live,
+            Path(self.config.map_file).expanduser().absolute(),
+            initial_pose=self._guess,
+            lidar_mount=mount,
+            clock=time.monotonic,
+        )
+
+    def start(self) -> None:
+        """Publish and subscribe; RViz's "2D Pose Estimate" gives a first guess."""
+        super().start()
+        self.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_guess, 1)
+
+    def _on_guess(self, message: PoseWithCovarianceStamped) -> None:
+        try:
+            self._guess = odometry_from(message, POSE_COVARIANCE).pose
+        except ScanError as error:
+            self.get_logger().error(f"initialpose: {error}")
+            return
+        self.restart()
+
+
+def main() -> int:
+    """Run the node until it is told to stop."""
+    return run(Localization)

@@ -1,0 +1,35 @@
+"""Node ``slam``: maps while the robot drives."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from contourslam.live.session import Session
+from contourslam.live.start import mapping
+from contourslam_ros.live_node import LiveNode
+from contourslam_ros.running import run
+
+
+class Slam(LiveNode):
+    """Corners, walls and the robot's pose, out of scans and odometry."""
+
+    def __init__(self) -> None:
+        super().__init__("slam")
+
+    def begin(self, mount: np.ndarray) -> Session:
+        """Map anew, or continue the map that is there."""
+        path = Path(self.config.map_file).expanduser().absolute() if self.config.map_file else None
+        return mapping(
+            self.settings.core,
+            self.settings.live,
+            map_file=path if path is not None and path.exists() else None,
+            autosave=path,
+            lidar_mount=mount,
+            clock=time.monotonic,
+        )
+
+
+def main() -> int:
+    """Run the node until it is told to stop."""
+    return run(Slam)

@@ -1,0 +1,153 @@
+"""Plays a recording into ROS as a robot would: python player.py PLAN.json, in a process of its own.
+
+Stamps are those of the wall clock at which a message belongs, or with `clock` those of the recording, with /clock.
+"""
+
+import json
+import sys
+import time
+from array import array
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, TransformStamped
+from nav_msgs.msg import Odometry as OdometryMessage
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan as ScanMessage
+from tf2_msgs.msg import TFMessage
+
+from contourslam.recordings import open_recording
+from contourslam.scan import LaserScan, Odometry
+from contourslam_ros.messages import quaternion
+
+
+@dataclass
+class Plan:
+    """What is played.
+
+    Attributes
+    ----------
+    pieces : list of [float, float]
+        Which seconds of the recording, one after another.
+    silent : list of [str, float, float]
+        "scan" or "odom", and the seconds of the playing during which it says nothing.
+    mount : list of float
+        x, y, z (m) and quaternion x, y, z, w of the lidar on the base, as the transform says.
+    """
+
+    recording: str
+    namespace: str = ""
+    prefix: str = ""
+    pieces: list[list[float]] = field(default_factory=lambda: [[0.0, 1e9]])
+    silent: list[list[Any]] = field(default_factory=list)
+    odometry: str = "topic"
+    mount: list[float] = field(default_factory=lambda: [0.1, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0])
+    upside_down: bool = False
+    clock: bool = False
+    rate: float = 1.0
+
+    def write(self, path: Path) -> Path:
+        path.write_text(json.dumps(asdict(self)))
+        return path
+
+
+def stamp(seconds: float) -> Time:
+    whole, nanoseconds = divmod(round(seconds * 1e9), 1_000_000_000)
+    return Time(sec=whole, nanosec=nanoseconds)
+
+
+def scan_message(scan: LaserScan, at: float, frame: str, upside_down: bool) -> ScanMessage:
+    count = len(scan.ranges)
+    message = ScanMessage()
+    message.header.stamp, message.header.frame_id = stamp(at), frame
+    message.angle_min, message.angle_max = float(scan.angles[0]), float(scan.angles[-1])
+    message.angle_increment = float(scan.angles[-1] - scan.angles[0]) / (count - 1)
+    if upside_down:
+        message.angle_min, message.angle_max = -message.angle_min, -message.angle_max
+        message.angle_increment = -message.angle_increment
+    message.time_increment = float(scan.offsets[-1]) / (count - 1)
+    message.scan_time = message.time_increment * count
+    message.range_min, message.range_max = scan.range_min, scan.range_max
+    message.ranges = array("f", scan.ranges.tolist())
+    return message
+
+
+def transform(at: float, parent: str, child: str, x: float, y: float, turn: Quaternion, z: float = 0.0) -> TFMessage:
+    stamped = TransformStamped(child_frame_id=child)
+    stamped.header.stamp, stamped.header.frame_id = stamp(at), parent
+    place = stamped.transform.translation
+    place.x, place.y, place.z = x, y, z
+    stamped.transform.rotation = turn
+    return TFMessage(transforms=[stamped])
+
+
+def odometry_message(reading: Odometry, at: float, prefix: str) -> OdometryMessage:
+    message = OdometryMessage(child_frame_id=prefix + "base_link")
+    message.header.stamp, message.header.frame_id = stamp(at), prefix + "odom"
+    message.pose.pose.position.x, message.pose.pose.position.y = reading.pose[:2].tolist()
+    message.pose.pose.orientation = quaternion(float(reading.pose[2]))
+    return message
+
+
+def play(plan: Plan) -> None:
+    messages = [m for m in open_recording(Path(plan.recording)).messages() if isinstance(m, LaserScan | Odometry)]
+    # A scan is sent when it is complete, in the order of the recording: when its last beam's odometry is.
+    times: list[float] = []
+    for message in messages:
+        ended = message.stamp + (float(message.offsets[-1]) if isinstance(message, LaserScan) else 0.0)
+        times.append(max(ended, times[-1] if times else ended))
+    zero = times[0]
+
+    rclpy.init()
+    node = rclpy.create_node("player", namespace=plan.namespace)
+    clock = node.create_publisher(Clock, "/clock", 10)
+    scans = node.create_publisher(ScanMessage, "scan", qos_profile_sensor_data)
+    wheels = node.create_publisher(OdometryMessage, "odom", 100)
+    moving = node.create_publisher(TFMessage, "/tf", 100)
+    still = node.create_publisher(
+        TFMessage, "/tf_static", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    )
+    x, y, z, *turn = plan.mount
+    turned = Quaternion(**dict(zip("xyzw", turn, strict=True)))
+    still.publish(transform(0.0, plan.prefix + "base_link", plan.prefix + "laser", x, y, turned, z))
+    while not scans.get_subscription_count() or (plan.odometry == "topic" and not wheels.get_subscription_count()):
+        rclpy.spin_once(node, timeout_sec=0.05)
+        time.sleep(0.02)
+    time.sleep(0.5)
+
+    began, passed = time.monotonic(), 0.0
+    wall = time.time()
+    for first, last in plan.pieces:
+        piece = [(t - zero, m) for t, m in zip(times, messages, strict=True) if first <= t - zero < last]
+        for since_zero, message in piece:
+            playing = passed + since_zero - first
+            time.sleep(max(0.0, began + playing / plan.rate - time.monotonic()))
+            # With a clock of its own, time runs back where a piece begins before the end of the one before.
+            shift = 0.0 if plan.clock else wall - zero - first + passed
+            at = message.stamp + shift
+            if plan.clock:
+                clock.publish(Clock(clock=stamp(since_zero + zero)))
+            kind = "scan" if isinstance(message, LaserScan) else "odom"
+            if any(name == kind and a <= playing < b for name, a, b in plan.silent):
+                continue
+            if isinstance(message, LaserScan):
+                scans.publish(scan_message(message, at, plan.prefix + "laser", plan.upside_down))
+            elif plan.odometry == "topic":
+                wheels.publish(odometry_message(message, at, plan.prefix))
+            elif plan.odometry == "tf":
+                px, py, heading = message.pose.tolist()
+                moving.publish(
+                    transform(at, plan.prefix + "odom", plan.prefix + "base_link", px, py, quaternion(heading))
+                )
+        passed += min(last, times[-1] - zero) - first
+    time.sleep(1.0)
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    play(Plan(**json.loads(Path(sys.argv[1]).read_text())))
