@@ -1,47 +1,33 @@
 """The streaming object of live use: messages go in as they come, poses with a covariance come out."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
-from contourslam.live.diagnostics import Diagnostic
-from contourslam.live.events import Incident, Source
+from contourslam.errors import ContourslamError
+from contourslam.geometry.poses import between, compose, inverse
+from contourslam.live.autosave import Autosave
+from contourslam.live.backing import Backing
+from contourslam.live.continuous import ContinuousOdometry
+from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
+from contourslam.live.events import Incident, Reason, Released, Source, TimeJump
+from contourslam.live.figures import Mapped, Rate
+from contourslam.live.smoothing import Smoother
+from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.mapper import Mapper
 from contourslam.slam.result import ScanUpdate
 
-
-@dataclass(frozen=True, slots=True)
-class Backing:
-    """What a session stands on; :mod:`contourslam.live.start` makes it for mapping and for localisation.
-
-    Attributes
-    ----------
-    begin : callable
-        Make the mapper to start with, and again after :meth:`Session.reset`.
-    lost : callable
-        Given a mapper whose robot may be anywhere now, make the mapper that finds it again; it may be the same one.
-    keep : callable or None
-        Make a map to save of a mapper; None where it cannot be saved.
-    open : callable or None
-        Make a mapper that continues a saved map, or localises in it.
-    write, read : callable or None
-        Write a map to a file, atomically, and read it.
-    fixed : bool
-        The map never changes: localisation.
-    """
-
-    begin: Callable[[], Mapper]
-    lost: Callable[[Mapper], Mapper]
-    keep: Callable[[Mapper], SavedMap] | None = None
-    open: Callable[[SavedMap], Mapper] | None = None
-    write: Callable[[SavedMap, Path], None] | None = None
-    read: Callable[[Path], SavedMap] | None = None
-    fixed: bool = False
+# Odometry that has moved by less while time ran back shows that only the clock was set: m, rad.
+SAME_PLACE = np.array([0.5, math.radians(30.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +48,8 @@ class Processed:
         The correction as it is: ``T_map_base = T_map_odom @ T_odom_base``.
     T_map_odom_smooth : ndarray, shape (3,)
         The correction to be published, see :class:`contourslam.live.smoothing.Smoother`.
+    localized : bool
+        False while the robot has not been found in a known map: the pose is then no more than a guess.
     update : ScanUpdate
         All that the mapper said.
     map_version : int
@@ -79,6 +67,7 @@ class Processed:
     T_odom_base: Floats
     T_map_odom: Floats
     T_map_odom_smooth: Floats
+    localized: bool
     update: ScanUpdate
     map_version: int
     incidents: tuple[Incident, ...]
@@ -96,6 +85,10 @@ class Session:
     No clock is read: `now` is the caller's, s, and should be one that nobody sets (``time.monotonic``), also where the
     stamps are of simulated time.
 
+    Where time runs back, the odometry tells what happened. Where it goes on from where it was, a clock was set, and the
+    map is continued. Else, and without odometry, the robot may be anywhere now: a recording or a simulation began
+    again, and the session goes on as after :meth:`lost`.
+
     Parameters
     ----------
     backing : Backing
@@ -106,6 +99,10 @@ class Session:
         Where the map is saved by itself; nowhere by default.
     clock : callable, optional
         What `now` comes from. It is asked when a scan is done, so that latencies hold the work too.
+    topics : mapping, optional
+        From "scan" and "odometry" to what people call them, for the diagnostics.
+    expects_odometry : bool
+        False where there is none: then no scan waits for it, and its absence is no fault.
     """
 
     def __init__(
@@ -116,70 +113,219 @@ class Session:
         odometry_lag: float = 0.0,
         autosave: Path | None = None,
         clock: Callable[[], float] | None = None,
+        topics: Mapping[Source, str] | None = None,
+        expects_odometry: bool = True,
     ) -> None:
-        raise NotImplementedError
+        self._backing, self._config, self._clock = backing, config, clock
+        self._topics: dict[Source, str] = {"scan": "scan", "odometry": "odometry", **(topics or {})}
+        self._expects_odometry = expects_odometry
+        self._work = threading.RLock()  # held while the mapper works
+        self._mapper = backing.begin()
+        self._odometry = ContinuousOdometry(config)
+        self._jump: TimeJump | None = None  # of which it is not yet known what it was
+        self._autosave: Autosave | None = None
+        if autosave is not None and backing.keep and backing.write and not backing.fixed and config.autosave_period > 0:
+            self._autosave = Autosave(autosave, config.autosave_period, backing.write)
+        self._inbox = threading.Lock()  # held for moments; all below is changed under it
+        waits = config if expects_odometry else replace(config, wait=1e-9)
+        self._synchroniser = Synchroniser(waits, odometry_lag=odometry_lag)
+        self._smoother = Smoother(config)
+        self._rates: dict[Source, Rate] = {"scan": Rate(config.remember), "odometry": Rate(config.remember)}
+        self._mapped = Mapped(config.remember)
+        self._paused, self._localized, self._version = False, backing.localized(self._mapper), 0
+        self._now, self._began = -math.inf, math.nan
+        self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
+
+    # Messages in: short, from any thread.
 
     def push_odometry(self, odometry: Odometry, now: float) -> None:
         """Take in one odometry reading."""
-        raise NotImplementedError
+        with self._inbox:
+            self._count("odometry", odometry.stamp, now)
+            self._synchroniser.push_odometry(odometry, now)
 
     def push_scan(self, scan: LaserScan, now: float) -> None:
         """Take in one scan."""
-        raise NotImplementedError
+        with self._inbox:
+            self._count("scan", scan.stamp, now)
+            if self._paused:
+                self._synchroniser.drop("scan", Reason.PAUSED, scan.stamp, now)
+            else:
+                self._synchroniser.push_scan(scan, now)
 
     def refuse(self, source: Source, stamp: float, why: str, now: float) -> None:
         """Count a message that could not be made into a scan or a reading, so that the diagnostics tell of it."""
-        raise NotImplementedError
+        with self._inbox:
+            self._count(source, stamp, now)
+            self._synchroniser.drop(source, Reason.REFUSED, stamp, now, why)
 
-    def poll(self, now: float) -> list[Processed]:
-        """Map every scan whose turn it is; to be called after each push and at least every :meth:`due` seconds."""
-        raise NotImplementedError
+    def _count(self, source: Source, stamp: float, now: float) -> None:
+        self._tick(now)
+        self._rates[source].count(stamp, self._now)
+
+    def _tick(self, now: float) -> None:
+        self._now = max(self._now, now)
+        if math.isnan(self._began):
+            self._began = now
+
+    # The work.
+
+    def poll(self, now: float, *, at_most: int | None = None) -> list[Processed]:
+        """Map every scan whose turn it is; to be called after each push and at least every :meth:`due` seconds.
+
+        Parameters
+        ----------
+        now : float
+            s.
+        at_most : int, optional
+            Give so many results, and leave the others for the next call; all by default.
+        """
+        done: list[Processed] = []
+        with self._work:
+            while at_most is None or len(done) < at_most:
+                with self._inbox:
+                    self._tick(now if self._clock is None else max(now, self._clock()))
+                    item = self._synchroniser.take(self._now)
+                if item is None:
+                    break
+                if isinstance(item, TimeJump):
+                    self._jump = item
+                    continue
+                processed = self._map(item)
+                if processed is not None:
+                    done.append(processed)
+            if self._autosave is not None and self._autosave.due(self._version, self._now):
+                self._autosave.hand_over(self._kept, self._version, self._now)
+        return done
 
     def due(self, now: float) -> float | None:
         """Give the time until :meth:`poll` has work even if no message comes, s; None where it never will."""
-        raise NotImplementedError
+        with self._inbox:
+            return self._synchroniser.due(now)
+
+    def _map(self, item: Released) -> Processed | None:
+        """Hand a scan and its odometry to the mapper."""
+        if self._jump is not None:
+            self._explain(self._jump, item)
+            self._jump = None
+        for reading in item.readings:
+            self._take_in(reading)
+        try:
+            update = self._mapper.push_scan(item.scan)
+        except ContourslamError as error:
+            with self._inbox:
+                self._synchroniser.drop("scan", Reason.FAILED, item.scan.stamp, self._now, str(error))
+            return None
+        T_odom_base = np.zeros(3) if self._odometry.last is None else self._odometry.raw(self._mapper.odometry_pose)
+        T_map_odom = compose(update.pose, inverse(T_odom_base))
+        localized = self._backing.localized(self._mapper)
+        with self._inbox:
+            if localized and not self._localized:
+                self._smoother.reset()  # where it was before is of no interest
+            self._localized = localized
+            smooth = self._smoother.correct(T_map_odom, T_odom_base, update.stamp) if localized else T_map_odom
+            if not self._backing.fixed and (update.matched or update.born or update.dropped):
+                self._version += 1
+            self._tick(self._now if self._clock is None else self._clock())
+            latency = self._now - item.arrived
+            self._mapped.add(update, latency, self._now)
+            return Processed(
+                update.stamp, update.pose, update.covariance, T_odom_base, T_map_odom, smooth, localized, update,
+                self._version, self._synchroniser.tally.new(), item.scan, latency,
+            )  # fmt: skip
+
+    def _take_in(self, reading: Odometry) -> None:
+        passed_on, leap = self._odometry.take(reading)
+        self._mapper.push_odometry(passed_on)
+        if leap:
+            self._note(
+                "leap",
+                f"the odometry leapt by {leap:.1f} at {reading.stamp:.2f} s, which is taken for no motion: "
+                f"was the base driver started again, or do two publish on {self._topics['odometry']}?",
+            )
+
+    def _explain(self, jump: TimeJump, item: Released) -> None:
+        """Tell a clock that was set from a robot that is elsewhere now, and go on accordingly."""
+        last, back = self._odometry.last, jump.before - jump.after
+        if last is not None and item.readings:
+            step = between(last.pose, item.readings[0].pose)
+            if (np.array([math.hypot(step[0], step[1]), abs(step[2])]) < SAME_PLACE).all():
+                self._note(
+                    "jump", f"stamps ran back by {back:.1f} s, the odometry did not: a clock was set; all goes on"
+                )
+                return
+        self._go_on_as_lost(None)
+        self._note(
+            "jump",
+            f"time ran back by {back:.1f} s, as where a recording or a simulation begins again: "
+            + ("the robot is looked for anew" if self._backing.fixed else "the drive is begun anew"),
+        )
+
+    def _note(self, what: str, text: str) -> None:
+        with self._inbox:
+            self._notes[what] = self._now, text
+
+    # The map.
 
     @property
     def map_version(self) -> int:
         """A number that grows whenever the map may have changed."""
-        raise NotImplementedError
+        return self._version
 
     def map_changed(self, version: int) -> bool:
         """Whether the map may have changed since :attr:`map_version` was `version`."""
-        raise NotImplementedError
+        return self._version != version
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
-        raise NotImplementedError
+        with self._work:
+            return self._mapper.corner_map()
 
     def wall_map(self) -> WallMap:
         """Walls of the map as they stand now."""
-        raise NotImplementedError
+        with self._work:
+            return self._mapper.wall_map()
 
     def map_to_odom(self, time: float) -> Floats | None:
         """Give the smooth ``T_map_odom`` at a time of the stamps' clock, s; None before the first scan. Never waits."""
-        raise NotImplementedError
+        with self._inbox:
+            return self._smoother.at(time)
+
+    # What people ask for.
 
     @property
     def paused(self) -> bool:
         """Whether scans are left out."""
-        raise NotImplementedError
+        return self._paused
 
     def pause(self) -> None:
         """Leave out scans, and count them; odometry goes on."""
-        raise NotImplementedError
+        with self._inbox:
+            self._paused = True
 
     def resume(self) -> None:
         """Take in scans again."""
-        raise NotImplementedError
+        with self._inbox:
+            self._paused = False
 
     def reset(self) -> None:
         """Begin anew; where there is an autosave, the map until now is first saved beside it as ``previous-NAME``."""
-        raise NotImplementedError
+        with self._work:
+            self._set_aside()
+            self._swap(self._backing.begin())
 
-    def lost(self) -> None:
-        """Say that the robot was carried away: the next scans find it again."""
-        raise NotImplementedError
+    def lost(self, pose: Floats | None = None) -> None:
+        """Say that the robot was carried away: it is looked for in the map, or a new map begun where it cannot be.
+
+        Where there is an autosave, the map until now is first saved beside it as ``previous-NAME``.
+
+        Parameters
+        ----------
+        pose : ndarray, shape (3,), optional
+            About where it is now in the map: m, m, rad.
+        """
+        with self._work:
+            self._go_on_as_lost(pose)
 
     def save(self, path: Path) -> None:
         """Save the map.
@@ -189,7 +335,11 @@ class Session:
         ContourslamError
             If it cannot be made or written; the file that stood there is as it was.
         """
-        raise NotImplementedError
+        with self._work:
+            saved = self._kept()
+        if self._backing.write is None:
+            raise ContourslamError("this session cannot write maps; start it with a way to")
+        self._backing.write(path, saved)
 
     def load(self, path: Path) -> None:
         """Continue a saved map, or localise in it.
@@ -199,12 +349,74 @@ class Session:
         ContourslamError
             If it cannot be read; the session is then as it was.
         """
-        raise NotImplementedError
-
-    def diagnostics(self, now: float) -> tuple[Diagnostic, ...]:
-        """Say how all is. Never waits."""
-        raise NotImplementedError
+        if self._backing.read is None or self._backing.open is None:
+            raise ContourslamError("this kind of map cannot be continued; use --back-end graph, or localise in it")
+        saved = self._backing.read(path)
+        with self._work:
+            mapper = self._backing.open(saved)
+            self._set_aside()
+            self._swap(mapper)
 
     def close(self) -> None:
         """Save what has not been saved by itself yet, where there is a place for it, and end."""
-        raise NotImplementedError
+        with self._work:
+            if self._autosave is not None:
+                self._autosave.close(self._kept, self._version, self._now)
+
+    def _kept(self) -> SavedMap:
+        if self._backing.keep is None:
+            raise ContourslamError("the map of this session cannot be saved")
+        return self._backing.keep(self._mapper)
+
+    def _set_aside(self) -> None:
+        """Save the map that is about to be left; whatever is wrong with that must not keep from going on."""
+        if self._autosave is not None and self._version > 0:
+            self._autosave.set_aside(self._kept)
+
+    def _go_on_as_lost(self, pose: Floats | None) -> None:
+        self._set_aside()
+        self._swap(self._backing.lost(self._mapper, pose))
+
+    def _swap(self, mapper: Mapper) -> None:
+        """Go on with another mapper, which hears where the odometry stands."""
+        last = self._odometry.last
+        if mapper is not self._mapper and last is not None:
+            self._odometry.reset()
+            if self._jump is None:
+                mapper.push_odometry(self._odometry.take(last)[0])
+        with self._inbox:
+            self._mapper = mapper
+            self._version += 1
+            self._smoother.reset()
+            self._localized = self._backing.localized(mapper)
+
+    # How all is.
+
+    def diagnostics(self, now: float) -> tuple[Diagnostic, ...]:
+        """Say how all is. Never waits."""
+        with self._inbox:
+            self._tick(now)
+            then = self._now - self._config.remember
+            notes = {what: text for what, (when, text) in self._notes.items() if when >= then}
+            saving = self._autosave
+            condition = Condition(
+                scans=self._sensor("scan", True),
+                odometry=self._sensor("odometry", self._expects_odometry),
+                incidents=self._synchroniser.tally.since(then),
+                totals=dict(self._synchroniser.tally.counts),
+                mapped=self._mapped.summary(self._now),
+                paused=self._paused,
+                localized=self._localized,
+                jump=notes.get("jump", ""),
+                leap=notes.get("leap", ""),
+                map_version=self._version,
+                saved=math.nan if saving is None else self._now - saving.saved_at,
+                autosave="" if saving is None else str(saving.path),
+                trouble="" if saving is None else saving.trouble,
+            )
+        return diagnose(condition, self._config)
+
+    def _sensor(self, source: Source, expected: bool) -> Sensor:
+        rate, now = self._rates[source], self._now
+        silent = now - max(rate.last, self._began)
+        return Sensor(self._topics[source], expected, rate.number, silent, rate.by_arrival(now), rate.by_stamps(now))

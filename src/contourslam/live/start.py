@@ -1,11 +1,19 @@
 """Sessions ready to use, one for mapping and one for localisation: what a node or a command needs to know."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from contourslam.config import Config, LiveConfig
 from contourslam.contour.contours import Floats
+from contourslam.errors import ConfigError
+from contourslam.live.backing import Backing
+from contourslam.live.events import Source
 from contourslam.live.session import Session
+from contourslam.localization.follow import Localizer
+from contourslam.maps.file import load_map, save_map
+from contourslam.maps.saved_map import SavedMap
+from contourslam.replay import make_mapper
+from contourslam.slam.mapper import Mapper
 
 
 def mapping(
@@ -17,6 +25,8 @@ def mapping(
     initial_pose: Floats | None = None,
     lidar_mount: Floats | None = None,
     clock: Callable[[], float] | None = None,
+    topics: Mapping[Source, str] | None = None,
+    expects_odometry: bool = True,
 ) -> Session:
     """Make a session that maps.
 
@@ -32,15 +42,31 @@ def mapping(
         Of the base in a new map; the origin by default.
     lidar_mount : ndarray, shape (3,), optional
         ``T_base_lidar``; that of the configuration by default.
-    clock : callable, optional
-        What the session's `now` comes from, see :class:`Session`.
+    clock, topics, expects_odometry
+        As of :class:`Session`.
 
     Raises
     ------
     ContourslamError
-        If the map cannot be read, or a setting or an extra is missing.
+        If the map cannot be read or continued, or a setting or an extra is missing.
     """
-    raise NotImplementedError
+
+    def begin(pose: Floats | None = initial_pose) -> Mapper:
+        return make_mapper(config, initial_pose=pose, lidar_mount=lidar_mount)
+
+    def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
+        return begin(initial_pose if pose is None else pose)
+
+    def keep(mapper: Mapper) -> SavedMap:
+        return SavedMap(mapper.corner_map(), mapper.wall_map())
+
+    backing = Backing(begin=begin, lost=lost, keep=keep, write=save_map, read=load_map)
+    if map_file is not None:
+        raise ConfigError(f"{map_file}: maps cannot be continued yet; localise in it, or begin a new one")
+    return Session(
+        backing, live, odometry_lag=config.slam.odometry_lag, autosave=autosave, clock=clock, topics=topics,
+        expects_odometry=expects_odometry,
+    )  # fmt: skip
 
 
 def localization(
@@ -51,6 +77,8 @@ def localization(
     initial_pose: Floats | None = None,
     lidar_mount: Floats | None = None,
     clock: Callable[[], float] | None = None,
+    topics: Mapping[Source, str] | None = None,
+    expects_odometry: bool = True,
 ) -> Session:
     """Make a session that localises in a saved map, which it leaves as it is.
 
@@ -60,13 +88,39 @@ def localization(
     live : LiveConfig
     map_file : Path
     initial_pose : ndarray, shape (3,), optional
-        A first guess of the base in the map; it is looked for everywhere by default.
-    lidar_mount, clock
-        As for :func:`mapping`.
+        About where the base is in the map as it starts; it is looked for everywhere by default.
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    clock, topics, expects_odometry
+        As of :class:`Session`.
 
     Raises
     ------
     ContourslamError
         If the map cannot be read, or nothing can be localised in it.
     """
-    raise NotImplementedError
+    current = load_map(map_file)
+
+    def begin(pose: Floats | None = initial_pose) -> Mapper:
+        return Localizer(current, config, initial_pose=pose, lidar_mount=lidar_mount)
+
+    def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
+        return begin(pose)
+
+    def open_map(saved: SavedMap) -> Mapper:
+        nonlocal current
+        mapper = Localizer(saved, config, lidar_mount=lidar_mount)
+        current = saved
+        return mapper
+
+    def localized(mapper: Mapper) -> bool:
+        return isinstance(mapper, Localizer) and mapper.localized
+
+    backing = Backing(
+        begin=begin, lost=lost, localized=localized, keep=lambda mapper: current, open=open_map, write=save_map,
+        read=load_map, fixed=True,
+    )  # fmt: skip
+    return Session(
+        backing, live, odometry_lag=config.slam.odometry_lag, clock=clock, topics=topics,
+        expects_odometry=expects_odometry,
+    )  # fmt: skip

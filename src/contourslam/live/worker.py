@@ -1,9 +1,12 @@
 """A thread that maps while messages come in."""
 
+import threading
 from collections.abc import Callable
 
 from contourslam.live.session import Processed, Session
 from contourslam.scan import LaserScan, Odometry
+
+LONGEST = 1.0  # s between two looks, for what must be saved
 
 
 class Worker:
@@ -28,20 +31,42 @@ class Worker:
         clock: Callable[[], float],
         failed: Callable[[BaseException], None],
     ) -> None:
-        raise NotImplementedError
+        self._session, self._done, self._clock, self._failed = session, done, clock, failed
+        self._news = threading.Event()
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="contourslam", daemon=True)
 
     def push_odometry(self, odometry: Odometry) -> None:
         """Hand on one reading; returns at once."""
-        raise NotImplementedError
+        self._session.push_odometry(odometry, self._clock())
+        self._news.set()
 
     def push_scan(self, scan: LaserScan) -> None:
         """Hand on one scan; returns at once."""
-        raise NotImplementedError
+        self._session.push_scan(scan, self._clock())
+        self._news.set()
 
     def start(self) -> None:
         """Start the thread."""
-        raise NotImplementedError
+        self._thread.start()
 
     def stop(self) -> None:
         """End the thread once its current scan is done, and close the session."""
-        raise NotImplementedError
+        self._ending.set()
+        self._news.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._session.close()
+
+    def _run(self) -> None:
+        try:
+            while not self._ending.is_set():
+                due = self._session.due(self._clock())
+                if due is None or due > 0.0:
+                    self._news.wait(LONGEST if due is None else min(due, LONGEST))
+                self._news.clear()
+                # One at a time, so that a pose does not wait for the scans that queue behind it.
+                for processed in self._session.poll(self._clock(), at_most=1):
+                    self._done(processed)
+        except BaseException as error:  # nobody else hears of it in a thread
+            self._failed(error)

@@ -1,0 +1,73 @@
+"""Odometry without the leaps that its driver makes when it is started again."""
+
+import math
+
+import numpy as np
+
+from contourslam.config import LiveConfig
+from contourslam.contour.contours import Floats
+from contourslam.geometry.poses import between, compose, inverse
+from contourslam.scan import Odometry
+
+SLACK = np.array([0.2, math.radians(20.0)])  # m and rad: what jitter of the stamps may add between two readings
+LONGEST = 1.0  # s: nobody is believed to have gone on at the greatest speed for longer
+
+
+class ContinuousOdometry:
+    """Readings passed on in a frame in which a leap is no motion; changed in place.
+
+    Until the first leap a reading is passed on as it is.
+
+    Parameters
+    ----------
+    config : LiveConfig
+    """
+
+    def __init__(self, config: LiveConfig) -> None:
+        self._most = np.array([config.max_speed, math.radians(config.max_turn_rate_deg)])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next reading is passed on as it is."""
+        self._last: Odometry | None = None
+        self._T_own_odom: Floats | None = None  # the odometry's frame in that which is passed on; None: the same
+
+    @property
+    def last(self) -> Odometry | None:
+        """The last reading, as it came; None before the first."""
+        return self._last
+
+    def take(self, reading: Odometry) -> tuple[Odometry, float]:
+        """Take in a reading.
+
+        Parameters
+        ----------
+        reading : Odometry
+
+        Returns
+        -------
+        reading : Odometry
+            To be passed on.
+        leap : float
+            By how much the odometry leapt, m, with 1 rad counted as 1 m; 0 where it did not.
+        """
+        leap = self._leap(reading)
+        if leap and self._last is not None:
+            own = self._last.pose if self._T_own_odom is None else compose(self._T_own_odom, self._last.pose)
+            self._T_own_odom = compose(own, inverse(reading.pose))
+        self._last = reading
+        if self._T_own_odom is None:
+            return reading, leap
+        return Odometry(reading.stamp, compose(self._T_own_odom, reading.pose)), leap
+
+    def raw(self, own: Floats) -> Floats:
+        """Give a pose in the frame that is passed on as the odometry itself has it (``T_odom_base``)."""
+        return own if self._T_own_odom is None else between(self._T_own_odom, own)
+
+    def _leap(self, reading: Odometry) -> float:
+        if self._last is None:
+            return 0.0
+        step = between(self._last.pose, reading.pose)
+        went = np.array([math.hypot(step[0], step[1]), abs(step[2])])
+        elapsed = min(max(reading.stamp - self._last.stamp, 0.0), LONGEST)
+        return float(went.sum()) if (went > self._most * elapsed + SLACK).any() else 0.0
