@@ -112,10 +112,19 @@ def test_two_rooms_that_look_alike_leave_the_loop_open() -> None:
     """Both lie inside the doubt: whichever is taken, the other is as good."""
     scene, lonely = Scene(contours(), contours(APART)), Scene(contours())
     for i, pose in enumerate((FIRST, SECOND, FIRST, SECOND)):
-        assert scene.look(pose, np.zeros(3), 4.0, 100.0 + 3.0 * i, 10 + i) == []
+        assert scene.look(pose, np.zeros(3), 4.0, 100.0 + (module.REST + 1.0) * i, 10 + i) == []
     assert scene.finder.searches == 4
     lonely.look(FIRST, np.zeros(3), 4.0, 100.0, 10)
     assert len(lonely.look(SECOND, np.zeros(3), 4.0, 103.0, 11)) == 2
+
+
+def test_a_place_searched_in_vain_is_let_be_for_a_while() -> None:
+    scene = Scene(contours(), contours(APART))
+    for i in range(3):
+        assert scene.look(FIRST, np.zeros(3), 4.0, 100.0 + 0.4 * module.REST * i, 10 + i) == []
+    assert scene.finder.searches == 1
+    assert scene.look(FIRST, np.zeros(3), 4.0, 100.0 + module.REST, 14) == []
+    assert scene.finder.searches == 2
 
 
 def test_a_room_that_looks_partly_alike_is_named_as_the_runner_up() -> None:

