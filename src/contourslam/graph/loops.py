@@ -176,10 +176,12 @@ class LoopFinder:
         """
         if not len(unsure.numbers) or travelled < self._searched_at + PAUSE:
             return []
+        chosen = self._turn(unsure.numbers, travelled)
+        if not chosen:
+            return []
         self._searched_at = travelled
         self._waiting = [w for w in self._waiting if travelled - w.travelled < FORGET]
         since = patch.anchor
-        chosen = self._turn(unsure.numbers, travelled)
         points = move(patch.cells.points[:, :4], inverse(local))
         points = points[np.hypot(points[:, 0], points[:, 1]) < PATCH_RADIUS]
         for i in chosen:
