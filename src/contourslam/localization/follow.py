@@ -6,16 +6,17 @@ from collections.abc import Callable
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Contours, Floats
 from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one
-from contourslam.landmarks import trace
+from contourslam.landmarks import find_landmarks, trace
 from contourslam.landmarks.detect import NO_MOTION
 from contourslam.localization.fixed_map import make_fixed_map
 from contourslam.localization.lookout import Finder, Lookout
+from contourslam.localization.sighted import Sighted
 from contourslam.maps import SavedMap
-from contourslam.matching.align import Alignment, align
+from contourslam.matching.align import POINT_SIGMA, Alignment, align
 from contourslam.matching.certainty import exposure, hold
 from contourslam.matching.odometry import FLOOR, LEAST_POINTS, LOOSER, POOR
 from contourslam.matching.oriented import move, oriented_points
@@ -30,14 +31,18 @@ FIRST_DOUBT = np.array([0.5, 0.5, math.radians(15.0)])  # of a pose that somebod
 USUAL = 0.85  # part of a scan that fits its map, before the drive has told
 LEAST_USUAL = 0.6  # so much of it at least, however much has changed
 LEARN = 0.02  # weight of the newest scan in what is usual
+LEAST_PART = 0.45  # what fits of a scan shows where the robot is if it is this part of it ...
+TRUE = 0.02  # ... and what was expected holds it where it wants to be itself, within this, m
 LOST = 8  # poor scans in a row, after which the map is no longer believed
+DOUBT = np.diag([0.05**2, 0.05**2, math.radians(1.5) ** 2])  # that each of these scans adds to the pose
 FOUND = 3  # good scans in a row that end all doubt
-RESCUE_EVERY = 8  # poor scans after which the neighbourhood is searched once more
+RESCUES, RESCUE_EVERY = 4, 8  # poor scans at which the neighbourhood is searched: the first ones, then every so many
 # A robot that is lost finds back into the map by itself while it is known this well where it is; else it must look.
 STRAYED, STRAYED_ANGLE = 1.0, math.radians(30.0)
 # Errors of the map, and of the lidar, are the same from scan to scan at one place: a fix is soon forgotten, so that a
 # robot at rest does not come to believe that it knows more than half of its variance better than one scan says.
 FORGET = 2.0
+LOOK_EVERY = 0.4  # m, or rad turned, after which corners and walls are looked for again
 SILENT = 0.05  # s before a scan; odometry that ends earlier leaves open how the robot moved
 STEADY_TIMES = np.array([0.0, 1.0])  # s
 LEARN_TURNS = 0.01  # weight of the newest scan in what is known of the wheels' turns
@@ -91,6 +96,7 @@ class Localizer:
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
         self.mount: Floats = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
         self._map, self._finder, self._lap = make_fixed_map(saved), finder, lap
+        self._sighted, self._way = Sighted(saved), LOOK_EVERY
         self._wheels = Wheels(config.slam)
         self._stamp = -math.inf
         self.localized = False
@@ -103,6 +109,8 @@ class Localizer:
             self._covariance = np.array(given, np.float64)
         self._steady, self._twist = NO_MOTION, np.zeros(3)  # the motion during a scan, if the robot goes on as it did
         self._stale = np.zeros((3, 3))  # what of the last fix is to be forgotten
+        self._last_step: Floats = np.zeros(3)
+        self._sure, self._since_sure = self._pose, np.zeros(3)  # the last pose beyond doubt, and the wheels since then
         self._turn_excess = 1.0  # variance of the wheels' turns as found, as a part of what is stated of them
         self._taught = 0
         self._lookout: Lookout | None = self._new_lookout()
@@ -160,7 +168,7 @@ class Localizer:
             noise = noise + np.diag((CRUISE * min(silent, max(elapsed, 0.0), LONGEST)) ** 2)
         exposed = exposure(scan.offsets, elapsed)
         self._stamp = scan.stamp
-        turn, turn_noise = float(increment[2]), float(noise[2, 2])
+        wheels, turn, turn_noise = increment, float(increment[2]), float(noise[2, 2])
         blur = exposed * turn_noise * self._turn_excess
         if self._lookout is None:
             share = min((math.hypot(increment[0], increment[1]) + abs(increment[2])) / 0.1, 1.0)
@@ -169,18 +177,22 @@ class Localizer:
             increment, noise = self._lookout.push(
                 oriented, increment, noise, exposed, elapsed if math.isfinite(elapsed) else 0.0
             )
-        before, quality = self._pose, 0.0
+        before, quality, nis = self._pose, 0.0, 0.0
+        self._since_sure = compose_one(self._since_sure, wheels)
         if self._placed:
             self._pose, self._covariance = moved(before, self._covariance + self._stale, increment, noise)
             self._stale = np.zeros((3, 3))
             if len(oriented) >= LEAST_POINTS:
-                quality = self._fit(oriented, before, blur)
+                quality, nis = self._fit(oriented, before, blur)
         if self._lookout is not None and self._poor > 0 and len(oriented) >= LEAST_POINTS:
             self._look(oriented, blur)
         if quality > POOR and turn_noise > 0.0:
             self._learn(wrap_angle(self._pose[2] - before[2] - turn) ** 2 / turn_noise)
         went = increment if not self._placed or self._lookout is not None else between_one(before, self._pose)
         self._wheels.went(went)
+        self._last_step = went
+        if self._poor == 0:
+            self._sure, self._since_sure = self._pose, np.zeros(3)
         if 0.0 < elapsed < LONGEST:
             # Over two steps: of one alone, an error would come back with the other sign at each scan and not fade.
             twist = went / elapsed
@@ -188,9 +200,26 @@ class Localizer:
             self._twist = twist
         self._lap("matching")
         covariance = self._covariance + self._map.doubt_at(self._pose) if self._placed else self._covariance
+        quality = quality if self.localized else 0.0
+        corners, walls, matched = self._landmarks(contours) if self._due(before) else (0, 0, ())
         return ScanUpdate(
-            scan.stamp, self._pose, covariance, 0, 0, (), (), (), (), 0.0, 0, quality if self.localized else 0.0
-        )  # fmt: skip
+            scan.stamp, self._pose, covariance, corners, walls, matched, (), (), (), nis, 3 if nis > 0.0 else 0, quality
+        )
+
+    def _due(self, before: Floats) -> bool:
+        """Whether corners and walls are worth looking for again."""
+        self._way += math.dist(before[:2], self._pose[:2]) + abs(wrap_angle(self._pose[2] - before[2]))
+        if not self.localized or self._way < LOOK_EVERY:
+            return False
+        self._way = 0.0
+        return True
+
+    def _landmarks(self, contours: Contours) -> tuple[int, int, tuple[int, ...]]:
+        """Corners and walls in the scan, and which of the map's they are."""
+        found = find_landmarks(contours, self.detector, self.config, self._lap)
+        matched = self._sighted.ids(found.corners, found.walls, compose_one(self._pose, self.mount))
+        self._lap("association")
+        return len(found.corners), len(found.walls), matched
 
     def _learn(self, square: float) -> None:
         """Hold the wheels' turn, in variances of what is stated of it, against that of the map."""
@@ -202,26 +231,42 @@ class Localizer:
         """Overlap that a good fit has."""
         return POOR * max(self._usual, LEAST_USUAL)
 
-    def _fit(self, oriented: Floats, before: Floats, blur: float) -> float:
-        """Align where the robot is expected; returns how well that fits, at most 1."""
+    def _fit(self, oriented: Floats, before: Floats, blur: float) -> tuple[float, float]:
+        """Align where the robot is expected; returns how well that fits, at most 1, and the innovation squared."""
         prior = invert(self._covariance)
         found = align(oriented, self._map.cells, self._pose, prior)
-        if found.overlap < self._enough():
+        good = self._good_enough(found, oriented)
+        if not good:
             first = self._lookout is not None and self._lookout.scans == 1  # near where somebody says
             self._doubt(oriented)
-            if first or self._poor % RESCUE_EVERY == 1:
+            if first or self._poor <= RESCUES or self._poor % RESCUE_EVERY == 0:
                 found = self._rescue(oriented, before, prior, found)
-        quality = min(found.overlap / max(self._usual, LEAST_USUAL), 1.0)
+                good = found.overlap >= self._enough()
+        off = found.pose - self._pose
+        off[2] = wrap_angle(off[2])
+        nis = LOOSER * float(off @ prior @ off) if self._lookout is None else 0.0
+        if good and (self.localized or self._near()):
+            self._take(found, oriented, blur)
+            self._agree(found)
+        elif not good:
+            self._good = 0
+            if self.localized:
+                self._take(found, oriented, blur, (found.overlap / self._usual) ** 2)
+                self._covariance = self._covariance + DOUBT
+                self.localized = self._poor < LOST
+        return min(found.overlap / max(self._usual, LEAST_USUAL), 1.0), nis
+
+    def _good_enough(self, found: Alignment, oriented: Floats) -> bool:
+        """Whether a scan fits as well as usual, or fits in part and there as truly as ever: things have been moved."""
         if found.overlap >= self._enough():
-            if self.localized or self._near():
-                self._take(found, oriented, blur)
-                self._agree(found)
-            return quality
-        self._good = 0
-        if self.localized:
-            self._take(found, oriented, blur, (found.overlap / self._usual) ** 2)
-            self.localized = self._poor < LOST
-        return quality
+            return True
+        if found.overlap < LEAST_PART:
+            return False
+        alone = align(oriented, self._map.cells, found.pose, LOOSE)
+        off = alone.pose - found.pose
+        off[2] = wrap_angle(off[2])
+        # By how much the points that fit move, root mean square.
+        return POINT_SIGMA * math.sqrt(float(off @ alone.information @ off) / max(alone.pairs, 1)) < TRUE
 
     def _near(self) -> bool:
         """Whether a robot that is lost is known well enough to find back by itself."""
@@ -245,11 +290,11 @@ class Localizer:
             self._poor, self._lookout = 0, None
 
     def _rescue(self, oriented: Floats, before: Floats, prior: Floats, poor: Alignment) -> Alignment:
-        """Search the neighbourhood; a pose that contradicts the motion must be found twice."""
-        cells = self._map.around(self._pose)
-        found, contradicts = find_again(oriented, cells, [self._pose, before], prior, poor, self._enough())
-        if contradicts and self._lookout is not None and not self._lookout.propose(found.pose):
-            return poor
+        """Search the neighbourhood: where the wheels have the robot, or where it would be had it gone on as before."""
+        expected = [self._pose, compose_one(before, self._last_step), compose_one(self._sure, self._since_sure)]
+        found, contradicts = find_again(oriented, self._map.around(self._pose), expected, prior, poor, self._enough())
+        if contradicts:
+            self._covariance = invert(LOOSE)
         return found
 
     def _look(self, oriented: Floats, blur: float) -> None:
