@@ -71,6 +71,19 @@ def test_only_the_command_line_prints_or_exits() -> None:
     assert [path for path in MODULES if room(path) not in ("cli", "__main__") and called(path) & wrong] == []
 
 
+def test_no_kernel_calls_the_linear_algebra_for_which_numba_needs_scipy() -> None:
+    """Compiled where SciPy is, such a kernel is taken from the cache where it is not, and ends the whole process."""
+    wrong = []
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef) and any(ast.unparse(d) == "kernel" for d in node.decorator_list):
+                names = [ast.unparse(n) for n in ast.walk(node) if isinstance(n, ast.Attribute)]
+                matrix = [n for n in ast.walk(node) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.MatMult)]
+                if matrix or any(name.startswith(("np.linalg", "np.dot")) for name in names):
+                    wrong.append(f"{path}: {node.name}")
+    assert wrong == []
+
+
 def test_nothing_unpickles_or_evaluates() -> None:
     wrong = {"pickle", "shelve", "marshal", "dill"}
     assert [path for path in MODULES if imported(path) & wrong or called(path) & {"eval", "exec"}] == []

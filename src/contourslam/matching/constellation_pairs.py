@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap_angle
 from contourslam.kernels import kernel
+from contourslam.matching import small
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -132,7 +133,7 @@ def solve(local: Floats, known: Floats, pose: Floats, pairs: Ints, sigma: float,
                 gradient[a] += weight / sigma**2 * off * row[a]
                 for b in range(3):
                     normal[a, b] += weight / sigma**2 * row[a] * row[b]
-    step = np.linalg.solve(normal, gradient)
+    step = small.solve(normal, gradient)
     return np.array([pose[0] - step[0], pose[1] - step[1], wrap_angle(pose[2] - step[2])])
 
 
