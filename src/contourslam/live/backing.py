@@ -34,6 +34,8 @@ class Backing:
         Write a map to a file, atomically, and read it: :func:`contourslam.maps.file.save_map` and ``load_map``.
     fixed : bool
         The map never changes: localisation.
+    guesses : bool
+        The mapper finds motion from the scans where the odometry is silent; else it waits for the odometry to catch up.
     """
 
     begin: Callable[[], Mapper]
@@ -44,3 +46,4 @@ class Backing:
     write: Callable[[Path, SavedMap], None] | None = None
     read: Callable[[Path], SavedMap] | None = None
     fixed: bool = False
+    guesses: bool = True

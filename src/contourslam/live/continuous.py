@@ -1,4 +1,4 @@
-"""Odometry without the leaps that its driver makes when it is started again."""
+"""Odometry without the leaps that its driver makes when it is started again, and without what went by unheard."""
 
 import math
 
@@ -16,11 +16,16 @@ LONGEST = 1.0  # s: nobody is believed to have gone on at the greatest speed for
 class ContinuousOdometry:
     """Readings passed on in a frame in which a leap is no motion; changed in place.
 
-    Until the first leap a reading is passed on as it is.
+    Until the first leap, or bridge, a reading is passed on as it is.
 
     Parameters
     ----------
     config : LiveConfig
+
+    Attributes
+    ----------
+    T_own_odom : ndarray, shape (3,), or None
+        The odometry's frame in that which is passed on; None while they are one.
     """
 
     def __init__(self, config: LiveConfig) -> None:
@@ -30,12 +35,17 @@ class ContinuousOdometry:
     def reset(self) -> None:
         """Forget everything: the next reading is passed on as it is."""
         self._last: Odometry | None = None
-        self._T_own_odom: Floats | None = None  # the odometry's frame in that which is passed on; None: the same
+        self._bridging = False
+        self.T_own_odom: Floats | None = None
 
     @property
     def last(self) -> Odometry | None:
         """The last reading, as it came; None before the first."""
         return self._last
+
+    def bridge(self) -> None:
+        """Let the next reading be no motion: scans have carried the pose over the gap before it."""
+        self._bridging = True
 
     def take(self, reading: Odometry) -> tuple[Odometry, float]:
         """Take in a reading.
@@ -52,17 +62,18 @@ class ContinuousOdometry:
             By how much the odometry leapt, m, with 1 rad counted as 1 m; 0 where it did not.
         """
         leap = self._leap(reading)
-        if leap and self._last is not None:
-            own = self._last.pose if self._T_own_odom is None else compose(self._T_own_odom, self._last.pose)
-            self._T_own_odom = compose(own, inverse(reading.pose))
+        bridging, self._bridging = self._bridging, False
+        if (leap or bridging) and self._last is not None:
+            own = self._last.pose if self.T_own_odom is None else compose(self.T_own_odom, self._last.pose)
+            self.T_own_odom = compose(own, inverse(reading.pose))
         self._last = reading
-        if self._T_own_odom is None:
+        if self.T_own_odom is None:
             return reading, leap
-        return Odometry(reading.stamp, compose(self._T_own_odom, reading.pose)), leap
+        return Odometry(reading.stamp, compose(self.T_own_odom, reading.pose)), leap
 
     def raw(self, own: Floats) -> Floats:
         """Give a pose in the frame that is passed on as the odometry itself has it (``T_odom_base``)."""
-        return own if self._T_own_odom is None else between(self._T_own_odom, own)
+        return own if self.T_own_odom is None else between(self.T_own_odom, own)
 
     def _leap(self, reading: Odometry) -> float:
         if self._last is None:

@@ -18,6 +18,7 @@ ADVICE = {
     Reason.BEFORE_JUMP: "they were on their way when time ran back",
 }
 MOST_NIS, FEWEST_DOF = 2.0, 30  # corrections are called inconsistent beyond this, and not on less evidence
+ENOUGH = 10  # scans that show how well they fit
 
 
 class Level(IntEnum):
@@ -237,7 +238,7 @@ def _map(c: Condition, config: LiveConfig) -> Diagnostic:
     if not c.localized:
         message = "the robot is not found in the map yet: drive it to where it sees walls and corners of the map"
         return Diagnostic(Level.ERROR, "map", message, values)
-    if c.mapped.quality < config.poor_quality:
+    if c.mapped.scans >= ENOUGH and c.mapped.quality < config.poor_quality:
         message = (
             f"scans fit the map poorly ({c.mapped.quality:.2f} of 1): "
             "does the lidar see walls, and is its mounting right?"

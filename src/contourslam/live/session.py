@@ -25,6 +25,7 @@ from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.mapper import Mapper
 from contourslam.slam.result import ScanUpdate
+from contourslam.slam.wheels import STALE
 
 # Odometry that has moved by less while time ran back shows that only the clock was set: m, rad.
 SAME_PLACE = np.array([0.5, math.radians(30.0)])
@@ -121,18 +122,20 @@ class Session:
         self._expects_odometry = expects_odometry
         self._work = threading.RLock()  # held while the mapper works
         self._mapper = backing.begin()
-        self._odometry = ContinuousOdometry(config)
+        self._odometry, self._lag = ContinuousOdometry(config), odometry_lag
         self._jump: TimeJump | None = None  # of which it is not yet known what it was
         self._autosave: Autosave | None = None
         if autosave is not None and backing.keep and backing.write and not backing.fixed and config.autosave_period > 0:
             self._autosave = Autosave(autosave, config.autosave_period, backing.write)
         self._inbox = threading.Lock()  # held for moments; all below is changed under it
-        waits = config if expects_odometry else replace(config, wait=1e-9)
+        waits = config if expects_odometry else replace(config, wait=math.ulp(0.0))
         self._synchroniser = Synchroniser(waits, odometry_lag=odometry_lag)
         self._smoother = Smoother(config)
         self._rates: dict[Source, Rate] = {"scan": Rate(config.remember), "odometry": Rate(config.remember)}
         self._mapped = Mapped(config.remember)
-        self._paused, self._localized, self._version = False, backing.localized(self._mapper), 0
+        self._T_own_odom: Floats | None = None  # that of `_odometry` at the last scan
+        self._paused, self._version = False, 0
+        self._localized, self._blind = backing.localized(self._mapper), True
         self._now, self._began = -math.inf, math.nan
         self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
 
@@ -210,28 +213,34 @@ class Session:
             self._jump = None
         for reading in item.readings:
             self._take_in(reading)
+        last = self._odometry.last
+        blind = last is None or item.scan.stamp - self._lag - last.stamp > STALE
+        if blind and self._backing.guesses:
+            self._odometry.bridge()  # or else the motion found without it would count twice when it returns
         try:
             update = self._mapper.push_scan(item.scan)
         except ContourslamError as error:
             with self._inbox:
                 self._synchroniser.drop("scan", Reason.FAILED, item.scan.stamp, self._now, str(error))
             return None
-        T_odom_base = np.zeros(3) if self._odometry.last is None else self._odometry.raw(self._mapper.odometry_pose)
-        T_map_odom = compose(update.pose, inverse(T_odom_base))
+        own = self._mapper.odometry_pose
+        T_map_own = compose(update.pose, inverse(own))
         localized = self._backing.localized(self._mapper)
         with self._inbox:
-            if localized and not self._localized:
-                self._smoother.reset()  # where it was before is of no interest
-            self._localized = localized
-            smooth = self._smoother.correct(T_map_odom, T_odom_base, update.stamp) if localized else T_map_odom
+            if blind or self._blind or not self._localized:
+                self._smoother.reset()  # motion without odometry is no correction, nor is being found
+            self._localized, self._blind, self._T_own_odom = localized, blind, self._odometry.T_own_odom
+            # Smoothed is what the pose does, and that goes on where the odometry's own frame leaps.
+            smooth = self._smoother.correct(T_map_own, own, update.stamp) if localized else T_map_own
             if not self._backing.fixed and (update.matched or update.born or update.dropped):
                 self._version += 1
             self._tick(self._now if self._clock is None else self._clock())
             latency = self._now - item.arrived
             self._mapped.add(update, latency, self._now)
             return Processed(
-                update.stamp, update.pose, update.covariance, T_odom_base, T_map_odom, smooth, localized, update,
-                self._version, self._synchroniser.tally.new(), item.scan, latency,
+                update.stamp, update.pose, update.covariance, self._odometry.raw(own), self._to_odom(T_map_own),
+                self._to_odom(smooth), localized, update, self._version, self._synchroniser.tally.new(), item.scan,
+                latency,
             )  # fmt: skip
 
     def _take_in(self, reading: Odometry) -> None:
@@ -289,7 +298,11 @@ class Session:
     def map_to_odom(self, time: float) -> Floats | None:
         """Give the smooth ``T_map_odom`` at a time of the stamps' clock, s; None before the first scan. Never waits."""
         with self._inbox:
-            return self._smoother.at(time)
+            smooth = self._smoother.at(time)
+            return None if smooth is None else self._to_odom(smooth)
+
+    def _to_odom(self, T_map_own: Floats) -> Floats:
+        return T_map_own if self._T_own_odom is None else compose(T_map_own, self._T_own_odom)
 
     # What people ask for.
 

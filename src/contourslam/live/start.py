@@ -60,7 +60,14 @@ def mapping(
     def keep(mapper: Mapper) -> SavedMap:
         return SavedMap(mapper.corner_map(), mapper.wall_map())
 
-    backing = Backing(begin=begin, lost=lost, keep=keep, write=save_map, read=load_map)
+    backing = Backing(
+        begin=begin,
+        lost=lost,
+        keep=keep,
+        write=save_map,
+        read=load_map,
+        guesses=config.back_end == "graph" or config.slam.contour_matching,
+    )
     if map_file is not None:
         raise ConfigError(f"{map_file}: maps cannot be continued yet; localise in it, or begin a new one")
     return Session(
