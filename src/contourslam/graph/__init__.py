@@ -10,6 +10,7 @@ except ModuleNotFoundError as error:
         "filter with --back-end ekf"
     ) from error
 
+from contourslam.graph.keeping import kept, resume
 from contourslam.graph.slam import GraphSlam
 
-__all__ = ["GraphSlam"]
+__all__ = ["GraphSlam", "kept", "resume"]

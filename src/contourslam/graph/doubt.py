@@ -4,6 +4,8 @@ Exact marginals of the graph cost more the larger it gets; this costs nothing an
 only the best chain between two places.
 """
 
+import math
+
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
@@ -12,6 +14,9 @@ from contourslam.kernels import kernel
 # Columns of the sums from the root to a node: xx, xy, yy, theta, theta x, theta y, theta xx, theta xy, theta yy, where
 # x, y is the place where the heading was lost.
 SUMS = 9
+# Heading lost by contour odometry after one metre, rad: what lidars err alike in from scan to scan (bias with the angle
+# of incidence) adds up along a wall, beyond what the noise of the points explains.
+HEADING_PER_M = math.radians(0.35)
 
 
 class DoubtTree:

@@ -16,7 +16,7 @@ from contourslam.graph.doubt import DoubtTree
 from contourslam.graph.landmark_expected import expected
 from contourslam.graph.landmark_factors import LANDMARK, bind
 from contourslam.graph.landmark_maps import judge, records, to_maps
-from contourslam.graph.landmark_set import find_landmark_set
+from contourslam.graph.landmark_set import LandmarkSet, find_landmark_set
 from contourslam.graph.pose_graph import PoseGraph
 from contourslam.graph.sightings import (
     COLUMNS,
@@ -34,6 +34,7 @@ from contourslam.graph.sightings import (
 from contourslam.kernels import kernel
 from contourslam.landmarks import find_landmarks
 from contourslam.landmarks.detect import Lap
+from contourslam.maps.saved_map import Seen
 from contourslam.scan import LaserScan
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.measurement import CORNER
@@ -113,6 +114,7 @@ class Landmarks:
         self._making: dict[int, list[int]] = {}  # rows in the making, with the sightings so far
         self._waiting: list[tuple[int, int]] = []  # sightings that are to enter the graph, with their landmark's row
         self._in_graph: set[int] = set()
+        self._home: dict[int, tuple[int, Floats]] = {}  # of earlier drives: by id, the keyframe they move with, and how
         self.failures: list[int] = []  # by id
         self._mapped: tuple[Floats, tuple[CornerMap, WallMap]] | None = None
 
@@ -180,8 +182,7 @@ class Landmarks:
             The covariances are those of each landmark's fit and of the first keyframe that saw it.
         """
         if self._mapped is None or not np.array_equal(self._mapped[0], poses):
-            n, found = self.sightings.count, find_landmark_set(self.sightings, poses)
-            ids, failed = records(found, self.sightings.ids[:n], self.failures)
+            found, ids, failed = self.named(poses)
             kept = judge(found, failed, self._config.slam)
             found, at = found.only(kept), poses[found.first[kept]]
             if spreads is None:
@@ -193,6 +194,30 @@ class Landmarks:
                 known = spreads(keys)[which]
             self._mapped = poses.copy(), to_maps(found, ids[kept], failed[kept], at, known.reshape(-1, 3, 3))
         return self._mapped[1]
+
+    def named(self, poses: Floats) -> tuple[LandmarkSet, Ints, Ints]:
+        """What the keyframes at these `poses` saw, good or not, their ids, and how often each was missed."""
+        found = find_landmark_set(self.sightings, poses)
+        return found, *records(found, self.sightings.ids[: self.sightings.count], self.failures)
+
+    def recall(self, seen: Seen, nodes: list[int], poses: Floats) -> None:
+        """Take in, before anything else, what keyframes at `poses` saw on earlier drives, the `nodes` being theirs."""
+        self.nodes, self._poses, self.failures = nodes, list(poses), seen.failures.tolist()
+        self.sightings.append(seen.keys, seen.rows)
+        self.sightings.ids[: self.sightings.count] = seen.ids
+        found, ids, failed = self.named(poses)
+        good = judge(found, failed, self._config.slam)
+        found, ids, failed = found.only(good), ids[good], failed[good]
+        last = np.zeros(len(found), np.int64)
+        labelled = np.flatnonzero(found.labels >= 0)
+        np.maximum.at(last, found.labels[labelled], self.sightings.keys[labelled])
+        for j, number in enumerate(ids.tolist()):
+            self._begin(found.table[j])
+            self._home[number] = int(last[j]), between_one(poses[last[j]], found.table[j, X : DIRECTION + 1])
+        self._making.clear()
+        rows = slice(len(found))
+        self._ids[rows], self._observed[rows], self._failed[rows] = ids, found.observed, failed
+        self._last[rows], self._node[rows], self._stale[rows] = last, np.array(nodes)[last], True
 
     def refresh(self, before: Floats, after: Floats) -> None:
         """Say how the graph has moved the robot: if far, each landmark is read anew from it when it is next come by."""
@@ -219,6 +244,9 @@ class Landmarks:
             number = int(self._ids[j])
             if number in self._in_graph:
                 self.table[j, X : DIRECTION + 1] = graph.pose(LANDMARK + number)
+            elif number in self._home:
+                key, seen = self._home[number]
+                self.table[j, X : DIRECTION + 1] = compose_one(graph.pose(key), seen)
 
     def _sharp(self, rows: Ints, node: int, pose: Floats) -> NDArray[np.bool_]:
         """Which rows were last seen from places that are known sharply from here."""

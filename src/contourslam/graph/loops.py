@@ -118,7 +118,7 @@ class LoopFinder:
         node : int
             Number of the active local map in the tree of doubt.
         """
-        numbers, distances = self._places.near(pose, len(self._places) - APART, REACH + 2.0 * float(WINDOW[0]))
+        numbers, distances = self._places.near(pose, self._places.left(APART), REACH + 2.0 * float(WINDOW[0]))
         doubts = self._doubt.between(node, self._places.nodes[numbers], pose)
         sigma = np.sqrt(doubts[:, 0, 0] + doubts[:, 1, 1])
         near = distances < REACH + 2.0 * sigma

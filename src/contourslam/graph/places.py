@@ -30,12 +30,15 @@ class Keyframe:
         Contour points and normals in the frame of the base.
     blur : float
         Variance of its heading from turns during the scan that are not known, rad^2.
+    drive : int
+        Number of its drive: the contour odometry knows nothing of what lies between two drives.
     """
 
     stamp: float
     local: Floats
     oriented: np.ndarray
     blur: float = 0.0
+    drive: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +78,13 @@ class Places:
     list : list of Place
     anchors : ndarray, shape (n, 3)
         Poses of their anchors in the world.
+    of_before : int
+        How many there were when this drive began.
     """
 
     def __init__(self, keyframes: list[Keyframe], half_width: float) -> None:
         self.list: list[Place] = []
+        self.of_before = 0
         self._keyframes, self._half_width = keyframes, half_width
         self._ready: OrderedDict[int, CellMap] = OrderedDict()
         self._holds: dict[int, Hold] = {}
@@ -90,6 +96,10 @@ class Places:
     def __len__(self) -> int:
         return len(self.list)
 
+    def left(self, apart: int) -> int:
+        """How many places the robot has left behind: those of this drive but the newest, and all of earlier drives."""
+        return max(len(self.list) - apart, self.of_before)
+
     @property
     def anchors(self) -> Floats:
         """Poses of the anchors in the world, shape (n, 3)."""
@@ -97,16 +107,20 @@ class Places:
 
     def add(self, local: LocalMap, node: int, anchor_pose: Floats) -> None:
         """Take in a local map that is finished, whose anchor lies at `anchor_pose` in the world."""
+        way = np.array([self._keyframes[m].local for m in local.members])
+        self.put(Place(local.anchor, tuple(local.members), between(local.pose, way), node), anchor_pose)
+
+    def put(self, place: Place, anchor_pose: Floats) -> None:
+        """Take in a place, whose anchor lies at `anchor_pose` in the world."""
         n = len(self.list)
         if n == len(self._anchors):
             for name in ("_anchors", "_offsets", "_centres", "nodes"):
                 old = getattr(self, name)
                 setattr(self, name, np.concatenate([old, np.zeros_like(old)]))
-        way = np.array([self._keyframes[m].local for m in local.members])
-        seen = between(local.pose, way)
-        self.list.append(Place(local.anchor, tuple(local.members), seen, node))
-        self._offsets[n, :2] = seen[:, :2].mean(axis=0)
-        self._anchors[n], self._centres[n], self.nodes[n] = anchor_pose, compose(anchor_pose, self._offsets[n]), node
+        self.list.append(place)
+        self._offsets[n, :2] = place.seen[:, :2].mean(axis=0)
+        self._anchors[n], self._centres[n] = anchor_pose, compose(anchor_pose, self._offsets[n])
+        self.nodes[n] = place.node
 
     def move(self, anchors: Floats) -> None:
         """Say anew where all anchors lie."""
@@ -153,11 +167,12 @@ class Places:
 
     def around(self, number: int) -> Floats:
         """Contour points of a place, the one before and the one after, in the frame of its anchor: x, y, nx, ny."""
-        own = self._keyframes[self.list[number].anchor].local
+        own = self._keyframes[self.list[number].anchor]
         rows = []
         for n in range(max(number - 1, 0), min(number + 2, len(self.list))):
-            to = between_one(own, self._keyframes[self.list[n].anchor].local)
-            rows.append(move(self.cells(n).points[:, :4], to))
+            other = self._keyframes[self.list[n].anchor]
+            if other.drive == own.drive:
+                rows.append(move(self.cells(n).points[:, :4], between_one(own.local, other.local)))
         return np.concatenate(rows)
 
     def into(self, number: int, pose: Floats) -> Floats:

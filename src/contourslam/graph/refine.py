@@ -62,7 +62,7 @@ def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.Non
     """Ties of all keyframes to the nearest places of other passes, place by place: each one's table is made once."""
     places.move(poses[[place.anchor for place in places.list]].reshape(-1, 3))
     ties = gtsam.NonlinearFactorGraph()
-    chosen = _pairs(poses, places)
+    chosen = _pairs(poses, np.array([keyframe.drive for keyframe in keyframes]), places)
     for number in np.unique(chosen[:, 1]).tolist():
         cells, anchor = places.cells(number), places.list[number].anchor
         for key in chosen[chosen[:, 1] == number, 0].tolist():
@@ -75,7 +75,7 @@ def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.Non
     return ties
 
 
-def _pairs(poses: Floats, places: Places) -> Ints:
+def _pairs(poses: Floats, drives: Ints, places: Places) -> Ints:
     """Keyframe and place of each tie to be tried, shape (n, 2)."""
     own = np.zeros(len(poses), np.int64)
     for number, place in enumerate(places.list):
@@ -83,7 +83,8 @@ def _pairs(poses: Floats, places: Places) -> Ints:
     rows = []
     for number in range(len(places)):
         distance = np.hypot(*(poses[:, :2] - places.centre(number)[:2]).T)
-        keys = np.flatnonzero((distance < REACH) & (np.abs(own - number) > APART))
+        other = (np.abs(own - number) > APART) | (drives != drives[places.list[number].anchor])
+        keys = np.flatnonzero((distance < REACH) & other)
         rows.append(np.column_stack([keys, np.full(len(keys), number), distance[keys]]))
     if not rows:
         return np.empty((0, 2), np.int64)

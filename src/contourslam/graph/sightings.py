@@ -122,8 +122,8 @@ class Sightings:
         self.rows = np.zeros((256, COLUMNS), np.float32)
         self.keys, self.ids = np.zeros(256, np.int32), np.full(256, -1, np.int32)
 
-    def append(self, key: int, rows: Floats) -> int:
-        """Keep the sightings of a keyframe; returns the index of the first."""
+    def append(self, key: int | NDArray[np.int32], rows: NDArray[np.floating]) -> int:
+        """Keep the sightings of a keyframe, or of several that ascend; returns the index of the first."""
         first, until = self.count, self.count + len(rows)
         while until > len(self.keys):
             self.rows = np.concatenate([self.rows, np.zeros_like(self.rows)])

@@ -9,15 +9,16 @@ from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.poses import between, between_one, compose, compose_one
-from contourslam.graph.doubt import DoubtTree
-from contourslam.graph.landmarks import NOTHING, Landmarks
+from contourslam.graph.doubt import HEADING_PER_M
+from contourslam.graph.landmarks import NOTHING
 from contourslam.graph.loops import LoopFinder, Tie
-from contourslam.graph.places import ROBUST_TIES, Keyframe, Places
-from contourslam.graph.pose_graph import PoseGraph, poses_of, spreads
+from contourslam.graph.memory import Memory, Settled
+from contourslam.graph.places import ROBUST_TIES, Keyframe
+from contourslam.graph.pose_graph import poses_of, spreads
 from contourslam.graph.refine import refine
 from contourslam.landmarks import trace
 from contourslam.matching.certainty import exposure
-from contourslam.matching.odometry import LENGTH, ContourOdometry, Step
+from contourslam.matching.odometry import ContourOdometry, Step
 from contourslam.matching.oriented import move, oriented_points
 from contourslam.matching.small import invert, moved, turned
 from contourslam.scan import LaserScan, Odometry
@@ -27,9 +28,6 @@ from contourslam.slam.result import Loop, ScanUpdate
 from contourslam.slam.wheels import Wheels
 
 ROBUST_WHEELS = 1.0  # width of the Cauchy kernel, in standard deviations
-# Heading lost by contour odometry after one metre, rad: what lidars err alike in from scan to scan (bias with the angle
-# of incidence) adds up along a wall, beyond what the noise of the points explains.
-HEADING_PER_M = math.radians(0.35)
 START = np.full(3, 1e-4)  # standard deviations of the pose in the world where the drive begins
 UPDATE = 4  # keyframes that enter the graph together: contour odometry is as good over a metre or two
 UPDATE_LATER = 300  # keyframes after which one more waits: a step of iSAM2 gets dearer as the graph grows
@@ -53,6 +51,16 @@ class GraphSlam:
         ``T_base_lidar``; that of the configuration by default.
     lap : callable, optional
         Called with the name of each stage when it is done, for those who measure time; the core reads no clock.
+    memory : Memory, optional
+        What is known from earlier drives; :func:`contourslam.graph.keeping.resume` makes it of a map that was kept.
+    doubt : ndarray, shape (3, 3), optional
+        Covariance of `initial_pose` in such a map, in its axes; needed with a memory that holds keyframes.
+
+    Attributes
+    ----------
+    memory : Memory
+    settled : Settled or None
+        The refined keyframes, as long as no keyframe has come after the refinement.
 
     Raises
     ------
@@ -68,6 +76,8 @@ class GraphSlam:
         initial_pose: Floats | None = None,
         lidar_mount: Floats | None = None,
         lap: Callable[[str], None] = lambda stage: None,
+        memory: Memory | None = None,
+        doubt: Floats | None = None,
     ) -> None:
         self.config = config
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
@@ -75,18 +85,20 @@ class GraphSlam:
         self.mount: Floats = np.array(lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
         self.start_pose: Floats = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, np.float64)
         self._wheels = Wheels(config.slam)
-        self._contour = ContourOdometry(lidar.max_range)
-        self._graph = PoseGraph()
-        self._keyframes: list[Keyframe] = []
-        self._places, self._doubt = Places(self._keyframes, lidar.max_range + LENGTH), DoubtTree()
+        self.memory = memory or Memory(config, self.detector, self.mount)
+        self._graph, self._keyframes = self.memory.graph, self.memory.keyframes
+        self._places, self._doubt = self.memory.places, self.memory.doubt
+        self._landmarks, self._nodes = self.memory.landmarks, self.memory.nodes
+        self._first = len(self._keyframes)
+        self._drive = self._keyframes[-1].drive + 1 if self._keyframes else 0
+        self._start_covariance = np.diag(START**2) if doubt is None else np.asarray(doubt, np.float64)
+        self._contour = self.memory.contour = ContourOdometry(lidar.max_range, self._first)
         # Of each scan: its keyframe, its pose seen from there, and its covariance in the world as known at the time.
         self._scans: list[tuple[int, Floats, Floats]] = []
-        self._settled: tuple[Floats, Floats] | None = None  # refined keyframes and their covariances
-        self._landmarks = Landmarks(config, self.detector, self.mount, self._doubt)
+        self.settled: Settled | None = self.memory.settled
         self._finder = LoopFinder(self._places, self._doubt, self._landmarks)
         self._ties: list[tuple[int, Tie]] = []
         self._tie_covariances: list[Floats] = []
-        self._nodes: dict[int, int] = {}
         self._stamp = -math.inf
         self._since, self._since_noise = np.zeros(3), np.zeros((3, 3))
         self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
@@ -129,8 +141,8 @@ class GraphSlam:
         self._lap("matching")
         count = NOTHING
         if step.keyframe is not None:
-            self._settled = None
-            kept = Keyframe(scan.stamp, step.pose, oriented.astype(np.float32), self._contour.blur)
+            self.settled = None
+            kept = Keyframe(scan.stamp, step.pose, oriented.astype(np.float32), self._contour.blur, self._drive)
             self._add_keyframe(step.keyframe, step, kept)
             self._lap("graph")
             node = self._nodes[step.anchor]
@@ -153,10 +165,10 @@ class GraphSlam:
         return self._map()[1]
 
     def _map(self) -> tuple[CornerMap, WallMap]:
-        if self._settled is None:
+        if self.settled is None:
             return self._landmarks.maps(poses_of(self._graph.estimate(len(self._keyframes)), len(self._keyframes)))
-        poses, covariances = self._settled
-        return self._landmarks.maps(poses, lambda keys: covariances[keys])
+        covariances = self.settled.covariances
+        return self._landmarks.maps(self.settled.poses, lambda keys: covariances[keys])
 
     def finish(self) -> Finished:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
@@ -169,7 +181,7 @@ class GraphSlam:
             places = self._places if self.config.graph.loops else None
             factors, values = refine(self._graph, self._keyframes, places, self._landmarks.sightings)
             poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
-            self._settled = poses, marginals
+            self.settled = Settled(poses, marginals, factors)
             still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map
             covariances = [moved(poses[key], marginals[key], seen, still)[1] for key, seen, _ in self._scans]
         else:
@@ -212,12 +224,14 @@ class GraphSlam:
     def _add_keyframe(self, key: int, step: Step, keyframe: Keyframe) -> None:
         """Bind a keyframe to the one before, to the local map it was aligned to, and to old places around it."""
         graph, keyframes = self._graph, self._keyframes
-        last = keyframes[-1].local if keyframes else step.pose
+        last = keyframes[-1].local if key > self._first else step.pose
         pose = compose_one(self._key_pose, between_one(last, step.pose))
         keyframes.append(keyframe)
         graph.add(key, pose)
         if key == 0:
             graph.fix(0, pose, START)
+        elif key == self._first:
+            self._bind_start(pose)
         else:
             wheel_noise = turned(self._since_noise, -self._since[2])
             graph.relate(key - 1, key, self._since, invert(wheel_noise + 1e-8 * np.eye(3)), ROBUST_WHEELS)
@@ -242,6 +256,14 @@ class GraphSlam:
             back = between_one(step.pose, keyframes[anchor].local)
             self._places.add(step.finished, self._nodes[anchor], compose_one(pose, back))
         self._key_covariance = self._doubt.from_start(self._nodes[step.anchor], self._key_pose)
+
+    def _bind_start(self, pose: Floats) -> None:
+        """Bind the first keyframe of a further drive to the one of earlier drives that lies nearest."""
+        old = self._graph.poses(range(self._first))
+        near = int(np.argmin(np.hypot(*(old[:, :2] - pose[:2]).T)))
+        information = invert(turned(self._start_covariance, -pose[2]))
+        self._graph.relate(near, self._first, between_one(old[near], pose), information, ROBUST_TIES)
+        self._nodes[self._first] = self._doubt.add(self._landmarks.nodes[near], pose, self._start_covariance)
 
     def _tie(self, key: int, step: Step, pose: Floats) -> bool:
         """Tie a keyframe to old places; True where that moves the robot by so much that it cannot wait."""

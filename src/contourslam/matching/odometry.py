@@ -120,7 +120,7 @@ class ContourOdometry:
     active : LocalMap or None
         What the next scan is aligned to.
     keyframes : int
-        How many there are.
+        Number of the next one.
     blur : float
         Variance of the last scan's heading from turns during it that the wheels did not tell, rad^2.
 
@@ -128,14 +128,16 @@ class ContourOdometry:
     ----------
     max_range : float
         No contour point lies farther from the robot than this, m.
+    first : int
+        Number of the first keyframe.
     """
 
-    def __init__(self, max_range: float) -> None:
+    def __init__(self, max_range: float, first: int = 0) -> None:
         self._half_width = max_range + LENGTH
         self.pose: Floats = np.zeros(3)
         self.active: LocalMap | None = None
         self._following: LocalMap | None = None
-        self.keyframes = 0
+        self.keyframes = first
         self._last_key: Floats = np.zeros(3)
         self._usual = 0.0
         self._motion: Floats = np.zeros(3)  # between the last two scans
@@ -182,7 +184,7 @@ class ContourOdometry:
                 # Contours know a scan's heading as it was on average over the scan: blur has been taken off the noise.
                 known = turn_noise * (1.0 - min(exposure, 1.0 / 3.0))
                 self._learn(wrap_angle(increment[2] - self._motion[2]) ** 2, known, share)
-        anchor = 0 if active is None else active.anchor
+        anchor = self.keyframes if active is None else active.anchor
         distance, turn = self._since_keyframe()
         self.blur = exposure * turn_noise * self.turn_excess
         keyframe, match, finished = None, None, None

@@ -1,0 +1,214 @@
+"""The graph's map as it is kept, and a further drive that goes on in it."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gtsam
+import numpy as np
+
+from contourslam.config import Config
+from contourslam.contour.contours import Floats, Ints
+from contourslam.detectors import Detector, make_detector
+from contourslam.errors import MapError
+from contourslam.geometry.poses import between
+from contourslam.graph.memory import Memory, Settled
+from contourslam.graph.places import Keyframe, Place
+from contourslam.graph.pose_graph import joined, poses_of, to_array
+from contourslam.graph.regrown import regrow
+from contourslam.graph.slam import GraphSlam
+from contourslam.maps.saved_map import Contoured, Relations, SavedMap, Seen, Stretches
+
+
+def kept(slam: GraphSlam, about: Mapping[str, str]) -> SavedMap:
+    """Everything that a graph knows, as it is kept; the drive may go on.
+
+    Parameters
+    ----------
+    slam : GraphSlam
+        After :meth:`GraphSlam.finish` the refined map is kept, before it the map as it stands.
+    about : mapping of str to str
+        What people want to know of the map.
+
+    Returns
+    -------
+    SavedMap
+        Its keyframes are in the frame of the map, which is the world of the first drive.
+    """
+    memory, settled = slam.memory, slam.settled
+    count = len(memory.keyframes)
+    if settled is None:
+        nodes, poses = memory.landmarks.nodes, poses_of(memory.graph.estimate(count), count)
+        spreads = [memory.doubt.from_start(node, pose) for node, pose in zip(nodes, poses, strict=True)]
+        settled = Settled(poses, np.array(spreads).reshape(-1, 3, 3))
+    return SavedMap(
+        slam.corner_map(),
+        slam.wall_map(),
+        _contoured(memory.keyframes, settled),
+        _relations(memory, settled),
+        _seen(memory, settled.poses),
+        _stretches(memory),
+        dict(about),
+    )
+
+
+def _contoured(keyframes: list[Keyframe], settled: Settled) -> Contoured:
+    points = [keyframe.oriented for keyframe in keyframes]
+    return Contoured(
+        np.array([keyframe.stamp for keyframe in keyframes]),
+        settled.poses,
+        settled.covariances,
+        np.array([keyframe.blur for keyframe in keyframes]),
+        np.cumsum([0, *map(len, points)]),
+        np.concatenate([np.empty((0, 4), np.float32), *points]),
+        np.array([keyframe.drive for keyframe in keyframes], np.int64),
+    )
+
+
+def _relations(memory: Memory, settled: Settled) -> Relations:
+    graph = memory.graph
+    every = joined(graph.factors, graph.ties) if settled.factors is None else settled.factors
+    count = every.size()
+    rows = [_relation(every.at(i)) for i in range(count)]
+    return Relations(
+        np.array([first for first, _, _, _, _ in rows], np.int64),
+        np.array([second for _, second, _, _, _ in rows], np.int64),
+        np.array([pose for _, _, pose, _, _ in rows]).reshape(-1, 3),
+        np.array([information for _, _, _, information, _ in rows]).reshape(-1, 3, 3),
+        np.array([robust for _, _, _, _, robust in rows], np.float64),
+        np.arange(count) >= graph.factors.size(),
+    )
+
+
+def _relation(factor: Any) -> tuple[int, int, Floats, Floats, float]:
+    """Two keyframes, the second seen from the first, information, width of the kernel."""
+    noise, robust = factor.noiseModel(), math.nan
+    if isinstance(noise, gtsam.noiseModel.Robust):
+        kernel: Any = noise.robust()
+        weight = kernel.weight(1.0)  # of Cauchy's kernel, which does not tell its width otherwise
+        noise, robust = noise.noise(), math.sqrt(weight / (1.0 - weight))
+    keys, information = factor.keys(), noise.information()
+    if isinstance(factor, gtsam.PriorFactorPose2):
+        return -1, keys[0], to_array(factor.prior()), information, robust
+    return keys[0], keys[1], to_array(factor.measured()), information, robust
+
+
+def _seen(memory: Memory, poses: Floats) -> Seen:
+    """Sightings, those of landmarks that only the whole drive showed named too, so that these keep their ids."""
+    sightings, failures = memory.landmarks.sightings, memory.landmarks.failures
+    n = sightings.count
+    ids = sightings.ids[:n].copy()
+    found, names, _ = memory.landmarks.named(poses)
+    new = (ids < 0) & (found.labels >= 0)
+    new[new] = names[found.labels[new]] >= len(failures)
+    ids[new] = names[found.labels[new]]
+    given = max(len(failures), int(names.max(initial=-1)) + 1)
+    missed = np.array([*failures, *[0] * (given - len(failures))], np.int64)
+    return Seen(sightings.keys[:n].copy(), ids, sightings.rows[:n].copy(), missed)
+
+
+def _stretches(memory: Memory) -> Stretches:
+    """Places, and the local map that the drive is in: it will be a place to the next one."""
+    pieces = [(place.anchor, place.members, place.seen) for place in memory.places.list]
+    active = None if memory.contour is None else memory.contour.active
+    if active is not None:
+        way = np.array([memory.keyframes[member].local for member in active.members])
+        pieces.append((active.anchor, tuple(active.members), between(active.pose, way)))
+    return Stretches(
+        np.array([anchor for anchor, _, _ in pieces], np.int64),
+        np.cumsum([0, *(len(members) for _, members, _ in pieces)]),
+        np.array([member for _, members, _ in pieces for member in members], np.int64),
+        np.concatenate([np.empty((0, 3)), *(seen for _, _, seen in pieces)]),
+    )
+
+
+def resume(
+    config: Config,
+    saved: SavedMap,
+    initial_pose: Floats,
+    covariance: Floats,
+    *,
+    detector: Detector | None = None,
+    lidar_mount: Floats | None = None,
+    lap: Callable[[str], None] = lambda stage: None,
+) -> GraphSlam:
+    """Begin a further drive in a map that was kept.
+
+    The drive begins at `initial_pose`, which is tied to the nearest old keyframe with `covariance`; from then on it is
+    tied to old places as any drive is that comes by them. Corners and walls keep their ids and their records;
+    :meth:`GraphSlam.finish` refines the whole map and gives the poses of the new drive's scans.
+
+    Parameters
+    ----------
+    config : Config
+    saved : SavedMap
+    initial_pose : ndarray, shape (3,)
+        Base in the frame of the map where the drive begins: m, m, rad.
+    covariance : ndarray, shape (3, 3)
+        Of `initial_pose`, in the axes of the map.
+    detector : Detector, optional
+    lidar_mount : ndarray, shape (3,), optional
+        ``T_base_lidar``; that of the configuration by default.
+    lap : callable, optional
+        As of :class:`GraphSlam`.
+
+    Returns
+    -------
+    GraphSlam
+
+    Raises
+    ------
+    MapError
+        If the map does not hold what a further drive needs: one of landmarks alone, or a file of version 1.
+    ConfigError
+        If the configuration names a detector that does not exist.
+    """
+    keyframes, relations, seen, stretches = saved.keyframes, saved.relations, saved.seen, saved.stretches
+    if keyframes is None or relations is None or seen is None or stretches is None or not len(keyframes):
+        lacks = "no keyframe" if keyframes is None or not len(keyframes) else "keyframes, but not what binds them"
+        raise MapError(f"this map cannot be continued, it holds {lacks}; map anew with --back-end graph")
+    detector = detector or make_detector(config.detector, adapted=config.adapted)
+    mount = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
+    memory = Memory(config, detector, mount)
+    memory.keyframes += _keyframes(keyframes)
+    _bind(memory, keyframes.poses, relations)
+    memory.nodes, nodes = regrow(memory.doubt, keyframes, relations, stretches.anchors)
+    _put(memory, stretches, keyframes.poses)
+    memory.landmarks.recall(seen, nodes, keyframes.poses)
+    memory.settled = Settled(keyframes.poses, keyframes.covariances)
+    return GraphSlam(
+        config, detector, initial_pose=initial_pose, lidar_mount=mount, lap=lap, memory=memory, doubt=covariance
+    )
+
+
+def _keyframes(kept: Contoured) -> list[Keyframe]:
+    """Keyframes of earlier drives; their own odometry being gone, the map takes its place."""
+    return [
+        Keyframe(float(kept.stamps[i]), kept.poses[i], kept.contour(i), float(kept.blurs[i]), int(kept.drives[i]))
+        for i in range(len(kept))
+    ]
+
+
+def _bind(memory: Memory, poses: Floats, relations: Relations) -> None:
+    graph = memory.graph
+    for key, pose in enumerate(poses):
+        graph.add(key, pose)
+    for i in range(len(relations.first)):
+        first, second, width = int(relations.first[i]), int(relations.second[i]), float(relations.robust[i])
+        information = relations.information[i]
+        if first < 0:
+            graph.fix(second, relations.poses[i], 1.0 / np.sqrt(np.diag(information)))
+        else:
+            robust = None if math.isnan(width) else width
+            graph.relate(first, second, relations.poses[i], information, robust, tie=bool(relations.ties[i]))
+    graph.update()
+
+
+def _put(memory: Memory, stretches: Stretches, poses: Floats) -> None:
+    """Take in the places; all of them lie behind the robot."""
+    for i, anchor in enumerate(stretches.anchors.tolist()):
+        entries = slice(stretches.starts[i], stretches.starts[i + 1])
+        members: Ints = stretches.members[entries]
+        place = Place(anchor, tuple(members.tolist()), stretches.seen[entries], memory.nodes[anchor])
+        memory.places.put(place, poses[anchor])
+    memory.places.of_before = len(memory.places)
