@@ -13,6 +13,8 @@ from contourslam.geometry.poses import between_one, compose_one
 from contourslam.landmarks import find_landmarks, trace
 from contourslam.landmarks.detect import NO_MOTION
 from contourslam.localization.fixed_map import make_fixed_map
+from contourslam.localization.known_map import KnownMap
+from contourslam.localization.locate import Locator
 from contourslam.localization.lookout import Finder, Lookout
 from contourslam.localization.sighted import Sighted
 from contourslam.maps import SavedMap
@@ -59,7 +61,8 @@ class Localizer:
     detector : Detector, optional
         A detector object of one's own; by default the one that the configuration names.
     finder : Finder, optional
-        Finds the robot anywhere in the map; without it, the robot must begin near `initial_pose`.
+        Finds the robot anywhere in the map; by default a :class:`contourslam.localization.locate.Locator`, for which the
+        map is made ready here: half a second for a floor of a thousand keyframes.
     initial_pose : ndarray, shape (3,), optional
         About where the base is in the map as it starts: m, m, rad.
     initial_covariance : ndarray, shape (3, 3), optional
@@ -95,7 +98,8 @@ class Localizer:
         self.config, self._saved = config, saved
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
         self.mount: Floats = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
-        self._map, self._finder, self._lap = make_fixed_map(saved), finder, lap
+        self._map, self._lap = make_fixed_map(saved), lap
+        self._finder: Finder = Locator(KnownMap(saved)) if finder is None else finder
         self._sighted, self._way = Sighted(saved), LOOK_EVERY
         self._wheels = Wheels(config.slam)
         self._stamp = -math.inf
@@ -292,8 +296,11 @@ class Localizer:
     def _rescue(self, oriented: Floats, before: Floats, prior: Floats, poor: Alignment) -> Alignment:
         """Search the neighbourhood: where the wheels have the robot, or where it would be had it gone on as before."""
         expected = [self._pose, compose_one(before, self._last_step), compose_one(self._sure, self._since_sure)]
-        found, contradicts = find_again(oriented, self._map.around(self._pose), expected, prior, poor, self._enough())
+        around = self._map.around(self._pose)
+        found, contradicts = find_again(oriented, around, expected, prior, poor, self._enough())
         if contradicts:
+            if found.overlap < self._enough():
+                return poor
             self._covariance = invert(LOOSE)
         return found
 

@@ -2,12 +2,15 @@
 
 import math
 from collections import deque
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from contourslam.contour.contours import Floats
 from contourslam.geometry.poses import between_one, compose_one, transform
+from contourslam.localization.posterior import Located
 from contourslam.localization.view import View, view_of
 from contourslam.matching.odometry import ContourOdometry
 from contourslam.matching.oriented import move
@@ -17,17 +20,36 @@ AGREE, AGREE_ANGLE = 0.25, math.radians(5.0)  # m, rad: two looks closer than th
 WAY = 5.0  # m of driving that a look takes in
 MOST_SCANS = 12  # nor does it take in more than these
 BROKEN = 0.6  # contours that fit those before worse than this say that the robot was carried off: all begins anew
-EAGER = 4  # looks that are taken in quick succession; later ones keep apart by more
+EAGER = 6  # looks that are taken in quick succession; later ones keep apart by more
 SOON, LATER = 0.25, 1.0  # s between the first looks, and between later ones
-REMEMBERED = 3  # looks that a new one is held against
+LIKELY = 0.7  # probability by which one of two looks is sure enough; a single one had to be surer
+MOST_LOOKS = 8  # that are remembered
+# Looks none of which is sure must be so many, along so much of way (m), each of them seeing no second place that comes
+# nearer to the first than by this factor.
+STEADY_LOOKS, STEADY_WAY, CLEAR = 4, 1.0, 0.5
 STILL = np.zeros(3), 1e-10 * np.eye(3)
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """The base in the drive's own frame and, by a look at the map, in the map."""
+
+    drive: Floats
+    pose: Floats
+    sure: bool
+    clear: bool
+
+    def agrees(self, later: "_Look") -> bool:
+        """Whether a later look finds the robot where it must have come to since."""
+        off = between_one(compose_one(self.pose, between_one(self.drive, later.drive)), later.pose)
+        return math.hypot(off[0], off[1]) < AGREE and abs(float(off[2])) < AGREE_ANGLE
 
 
 class Finder(Protocol):
     """Finds a robot in a whole map."""
 
-    def find(self, view: View) -> Floats | None:
-        """Pose of the base in the map, shape (3,), where it is sure of one; None where it is not."""
+    def find(self, view: View) -> Located:
+        """Where what was seen lies in the map, and how sure that is."""
 
 
 class Lookout:
@@ -35,15 +57,14 @@ class Lookout:
 
     Parameters
     ----------
-    finder : Finder or None
-        None where nobody looks in the whole map.
+    finder : Finder
     max_range : float
         No contour point lies farther from the robot than this, m.
     lidar : ndarray, shape (2,)
         Where the lidar sits on the base, m.
     """
 
-    def __init__(self, finder: Finder | None, max_range: float, lidar: Floats) -> None:
+    def __init__(self, finder: Finder, max_range: float, lidar: Floats) -> None:
         self._finder, self._max_range, self._lidar = finder, max_range, lidar
         self.scans = 0
         self._looks = 0
@@ -53,7 +74,7 @@ class Lookout:
     def _begin(self) -> None:
         self._odometry = ContourOdometry(self._max_range)
         self._kept: deque[tuple[Floats, Floats]] = deque(maxlen=MOST_SCANS)
-        self._proposed: deque[Floats] = deque(maxlen=REMEMBERED)  # where the map lies, seen from the drive's own frame
+        self._seen: deque[_Look] = deque(maxlen=MOST_LOOKS)
         self._newest: Floats = np.empty((0, 4))
 
     @property
@@ -90,23 +111,32 @@ class Lookout:
         return step.increment, step.covariance
 
     def look(self) -> Floats | None:
-        """Look in the whole map, where a look is due; gives the pose in it where this look and an earlier one agree."""
-        if self._finder is None or self._next_look > 0.0:
+        """Look in the whole map, where a look is due; gives the pose in it where looks agree on one.
+
+        Two looks are enough that are both sure of the pose. Where much has changed none is, for the robot might as well
+        be in another building: then all looks along some way must agree, and none see a second place like it.
+        """
+        if self._next_look > 0.0:
             return None
         self._looks += 1
         self._next_look = SOON if self._looks <= EAGER else LATER
-        pose = self._finder.find(self.view())
-        return None if pose is None or not self.propose(pose) else pose
+        found = self._finder.find(self.view())
+        if not np.isfinite(found.pose).all():
+            self._seen.clear()
+            return None
+        clear = not found.runners_up or found.runners_up[0].probability < CLEAR * found.probability
+        look = _Look(self.pose, found.pose, found.confident or (clear and found.probability > LIKELY), clear)
+        agreeing = [other for other in self._seen if other.agrees(look)]
+        sure = look.sure and any(other.sure for other in agreeing)
+        if len(agreeing) < len(self._seen):
+            self._seen = deque([other for other in agreeing if other.sure], MOST_LOOKS)
+        self._seen.append(look)
+        return look.pose if sure or self._steady() else None
 
-    def propose(self, pose: Floats) -> bool:
-        """Say that the robot is at a pose in the map; True where it was said before, as far as it has moved since."""
-        map_from_drive = compose_one(pose, between_one(self.pose, np.zeros(3)))
-        agreed = False
-        for other in self._proposed:
-            off = between_one(compose_one(other, self.pose), pose)
-            agreed = agreed or (math.hypot(off[0], off[1]) < AGREE and abs(float(off[2])) < AGREE_ANGLE)
-        self._proposed.append(map_from_drive)
-        return agreed
+    def _steady(self) -> bool:
+        """Whether all looks along some way say the same."""
+        way = sum(math.dist(a.drive[:2], b.drive[:2]) for a, b in pairwise(self._seen))
+        return len(self._seen) >= STEADY_LOOKS and way > STEADY_WAY and all(look.clear for look in self._seen)
 
     def view(self) -> View:
         """What was seen on the last metres, in the frame of the base now."""
