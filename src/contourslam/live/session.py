@@ -3,77 +3,27 @@
 import math
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
 from contourslam.errors import ContourslamError
-from contourslam.geometry.poses import between, compose, inverse
 from contourslam.live.autosave import Autosave
 from contourslam.live.backing import Backing
-from contourslam.live.continuous import ContinuousOdometry
+from contourslam.live.course import Course, Step
 from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
-from contourslam.live.events import Incident, Reason, Released, Source, TimeJump
+from contourslam.live.events import Reason, Released, Source, TimeJump
 from contourslam.live.figures import Mapped, Rate
+from contourslam.live.processed import Processed
 from contourslam.live.smoothing import Smoother
 from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.mapper import Mapper
-from contourslam.slam.result import ScanUpdate
-from contourslam.slam.wheels import STALE
 
-# Odometry that has moved by less while time ran back shows that only the clock was set: m, rad.
-SAME_PLACE = np.array([0.5, math.radians(30.0)])
-
-
-@dataclass(frozen=True, slots=True)
-class Processed:
-    """What one scan gave.
-
-    Attributes
-    ----------
-    stamp : float
-        Of the scan, s; the poses are those at this time.
-    T_map_base : ndarray, shape (3,)
-        m, m, rad.
-    covariance : ndarray, shape (3, 3)
-        Its covariance, in the axes of the map.
-    T_odom_base : ndarray, shape (3,)
-        Raw odometry at the stamp; zeros where none has ever come.
-    T_map_odom : ndarray, shape (3,)
-        The correction as it is: ``T_map_base = T_map_odom @ T_odom_base``.
-    T_map_odom_smooth : ndarray, shape (3,)
-        The correction to be published, see :class:`contourslam.live.smoothing.Smoother`.
-    localized : bool
-        False while the robot has not been found in a known map: the pose is then no more than a guess.
-    update : ScanUpdate
-        All that the mapper said.
-    map_version : int
-        Greater than before where the map may have changed.
-    incidents : tuple of Incident
-        What was dropped, or had no odometry, since the scan before; this scan's own lack among them.
-    scan : LaserScan
-    latency : float
-        From the scan's coming to its pose, on the caller's clock, s.
-    """
-
-    stamp: float
-    T_map_base: Floats
-    covariance: Floats
-    T_odom_base: Floats
-    T_map_odom: Floats
-    T_map_odom_smooth: Floats
-    localized: bool
-    update: ScanUpdate
-    map_version: int
-    incidents: tuple[Incident, ...]
-    scan: LaserScan
-    latency: float
+__all__ = ["Processed", "Session"]
 
 
 class Session:
@@ -121,8 +71,7 @@ class Session:
         self._topics: dict[Source, str] = {"scan": "scan", "odometry": "odometry", **(topics or {})}
         self._expects_odometry = expects_odometry
         self._work = threading.RLock()  # held while the mapper works
-        self._mapper = backing.begin()
-        self._odometry, self._lag = ContinuousOdometry(config), odometry_lag
+        self._course = Course(backing, config, odometry_lag)
         self._jump: TimeJump | None = None  # of which it is not yet known what it was
         self._autosave: Autosave | None = None
         if autosave is not None and backing.keep and backing.write and not backing.fixed and config.autosave_period > 0:
@@ -133,9 +82,8 @@ class Session:
         self._smoother = Smoother(config)
         self._rates: dict[Source, Rate] = {"scan": Rate(config.remember), "odometry": Rate(config.remember)}
         self._mapped = Mapped(config.remember)
-        self._T_own_odom: Floats | None = None  # that of `_odometry` at the last scan
+        self._step: Step | None = None  # that of the last scan
         self._paused, self._version = False, 0
-        self._localized, self._blind = backing.localized(self._mapper), True
         self._now, self._began = -math.inf, math.nan
         self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
 
@@ -207,63 +155,48 @@ class Session:
             return self._synchroniser.due(now)
 
     def _map(self, item: Released) -> Processed | None:
-        """Hand a scan and its odometry to the mapper."""
         if self._jump is not None:
-            self._explain(self._jump, item)
-            self._jump = None
-        for reading in item.readings:
-            self._take_in(reading)
-        last = self._odometry.last
-        blind = last is None or item.scan.stamp - self._lag - last.stamp > STALE
-        if blind and self._backing.guesses:
-            self._odometry.bridge()  # or else the motion found without it would count twice when it returns
+            jump, self._jump = self._jump, None
+            self._explain(jump, item)
         try:
-            update = self._mapper.push_scan(item.scan)
+            step = self._course.step(item)
         except ContourslamError as error:
             with self._inbox:
                 self._synchroniser.drop("scan", Reason.FAILED, item.scan.stamp, self._now, str(error))
             return None
-        own = self._mapper.odometry_pose
-        T_map_own = compose(update.pose, inverse(own))
-        localized = self._backing.localized(self._mapper)
+        if self._course.leap:
+            self._note(
+                "leap",
+                f"the odometry leapt by {self._course.leap:.1f} m, which is taken for no motion: was the base driver "
+                f"started again, or do two publish on {self._topics['odometry']}?",
+            )
+        update = step.update
         with self._inbox:
-            if blind or self._blind or not self._localized:
+            before, self._step = self._step, step
+            if before is None or step.blind or before.blind or not before.localized:
                 self._smoother.reset()  # motion without odometry is no correction, nor is being found
-            self._localized, self._blind, self._T_own_odom = localized, blind, self._odometry.T_own_odom
-            # Smoothed is what the pose does, and that goes on where the odometry's own frame leaps.
-            smooth = self._smoother.correct(T_map_own, own, update.stamp) if localized else T_map_own
+            # What is smoothed is the pose, which goes on where the odometry's own frame leaps.
+            smooth = correction = step.correction
+            if step.localized:
+                smooth = self._smoother.correct(correction, step.T_own_base, update.stamp)
             if not self._backing.fixed and (update.matched or update.born or update.dropped):
                 self._version += 1
             self._tick(self._now if self._clock is None else self._clock())
             latency = self._now - item.arrived
             self._mapped.add(update, latency, self._now)
             return Processed(
-                update.stamp, update.pose, update.covariance, self._odometry.raw(own), self._to_odom(T_map_own),
-                self._to_odom(smooth), localized, update, self._version, self._synchroniser.tally.new(), item.scan,
+                update.stamp, update.pose, update.covariance, step.raw_odometry, step.to_odom(correction),
+                step.to_odom(smooth), step.localized, update, self._version, self._synchroniser.tally.new(), item.scan,
                 latency,
             )  # fmt: skip
 
-    def _take_in(self, reading: Odometry) -> None:
-        passed_on, leap = self._odometry.take(reading)
-        self._mapper.push_odometry(passed_on)
-        if leap:
-            self._note(
-                "leap",
-                f"the odometry leapt by {leap:.1f} at {reading.stamp:.2f} s, which is taken for no motion: "
-                f"was the base driver started again, or do two publish on {self._topics['odometry']}?",
-            )
-
     def _explain(self, jump: TimeJump, item: Released) -> None:
         """Tell a clock that was set from a robot that is elsewhere now, and go on accordingly."""
-        last, back = self._odometry.last, jump.before - jump.after
-        if last is not None and item.readings:
-            step = between(last.pose, item.readings[0].pose)
-            if (np.array([math.hypot(step[0], step[1]), abs(step[2])]) < SAME_PLACE).all():
-                self._note(
-                    "jump", f"stamps ran back by {back:.1f} s, the odometry did not: a clock was set; all goes on"
-                )
-                return
-        self._go_on_as_lost(None)
+        back = jump.before - jump.after
+        if self._course.was_only_the_clock(item):
+            self._note("jump", f"stamps ran back by {back:.1f} s, the odometry did not: a clock was set; all goes on")
+            return
+        self._go_on_as_lost(None, jump)
         self._note(
             "jump",
             f"time ran back by {back:.1f} s, as where a recording or a simulation begins again: "
@@ -288,21 +221,18 @@ class Session:
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
         with self._work:
-            return self._mapper.corner_map()
+            return self._course.mapper.corner_map()
 
     def wall_map(self) -> WallMap:
         """Walls of the map as they stand now."""
         with self._work:
-            return self._mapper.wall_map()
+            return self._course.mapper.wall_map()
 
     def map_to_odom(self, time: float) -> Floats | None:
         """Give the smooth ``T_map_odom`` at a time of the stamps' clock, s; None before the first scan. Never waits."""
         with self._inbox:
-            smooth = self._smoother.at(time)
-            return None if smooth is None else self._to_odom(smooth)
-
-    def _to_odom(self, T_map_own: Floats) -> Floats:
-        return T_map_own if self._T_own_odom is None else compose(T_map_own, self._T_own_odom)
+            smooth, step = self._smoother.at(time), self._step
+            return None if smooth is None or step is None else step.to_odom(smooth)
 
     # What people ask for.
 
@@ -379,29 +309,23 @@ class Session:
     def _kept(self) -> SavedMap:
         if self._backing.keep is None:
             raise ContourslamError("the map of this session cannot be saved")
-        return self._backing.keep(self._mapper)
+        return self._backing.keep(self._course.mapper)
 
     def _set_aside(self) -> None:
         """Save the map that is about to be left; whatever is wrong with that must not keep from going on."""
         if self._autosave is not None and self._version > 0:
             self._autosave.set_aside(self._kept)
 
-    def _go_on_as_lost(self, pose: Floats | None) -> None:
+    def _go_on_as_lost(self, pose: Floats | None, jump: TimeJump | None = None) -> None:
         self._set_aside()
-        self._swap(self._backing.lost(self._mapper, pose))
+        self._swap(self._backing.lost(self._course.mapper, pose), jump)
 
-    def _swap(self, mapper: Mapper) -> None:
-        """Go on with another mapper, which hears where the odometry stands."""
-        last = self._odometry.last
-        if mapper is not self._mapper and last is not None:
-            self._odometry.reset()
-            if self._jump is None:
-                mapper.push_odometry(self._odometry.take(last)[0])
+    def _swap(self, mapper: Mapper, jump: TimeJump | None = None) -> None:
         with self._inbox:
-            self._mapper = mapper
+            self._course.go_on_with(mapper, jump)
             self._version += 1
             self._smoother.reset()
-            self._localized = self._backing.localized(mapper)
+            self._step = None
 
     # How all is.
 
@@ -419,7 +343,7 @@ class Session:
                 totals=dict(self._synchroniser.tally.counts),
                 mapped=self._mapped.summary(self._now),
                 paused=self._paused,
-                localized=self._localized,
+                localized=self._course.localized if self._step is None else self._step.localized,
                 jump=notes.get("jump", ""),
                 leap=notes.get("leap", ""),
                 map_version=self._version,
