@@ -21,6 +21,7 @@ COMMANDS = {
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare the landmark detectors and write the report.",
     "world": "Write a simulated room as a world of Gazebo.",
+    "warm-up": "Compile everything before the robot drives.",
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""
 

@@ -10,7 +10,7 @@ from contourslam.kernels import kernel
 from contourslam.scan import LaserScan
 from contourslam.slam import measurement
 from contourslam.slam.measurement import CORNER
-from contourslam.slam.visibility import expected_in_scan
+from contourslam.slam.visibility import by_angle, expected_in_scan
 
 
 @kernel
@@ -48,12 +48,8 @@ def expected(table: Floats, rows: Ints, scan: LaserScan, lidar: Floats, config: 
     -------
     ndarray of bool, shape (k,)
     """
-    angles, ranges, least = scan.angles, scan.ranges, config.landmarks
-    if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
-        way = np.argsort(angles, kind="stable")
-        angles, ranges = angles[way], ranges[way]
-    mean, looks = _for_visibility(table, rows)
+    least, (mean, looks) = config.landmarks, _for_visibility(table, rows)
     return expected_in_scan(
-        mean, looks, len(rows), lidar, angles, ranges, min(config.lidar.max_range, scan.range_max), least.min_side,
+        mean, looks, len(rows), lidar, *by_angle(scan), min(config.lidar.max_range, scan.range_max), least.min_side,
         least.min_side_points, least.min_wall, least.min_wall_points,
     )  # fmt: skip

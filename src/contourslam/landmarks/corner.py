@@ -191,4 +191,8 @@ def refine_corners(contours: Contours, candidates: Floats, sigma_range: float, c
         config.min_side_points, math.radians(config.min_opening_deg), math.radians(config.max_opening_deg),
         config.position_floor, config.refined,
     )  # fmt: skip
-    return Corners(rows[:, 0:2], covariances, rows[:, 2], rows[:, 3], rows[:, 4] > 0.5, rows[:, 5:7], rows[:, 7:9])
+    # Copies: a column of one row is contiguous and one of two is not, and Numba compiles for each anew, in mid-drive.
+    places, directions, openings, sides, raw = (
+        rows[:, part].copy() for part in (slice(0, 2), 2, 3, slice(5, 7), slice(7, 9))
+    )
+    return Corners(places, covariances, directions, openings, rows[:, 4] > 0.5, sides, raw)

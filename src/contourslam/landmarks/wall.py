@@ -108,4 +108,5 @@ def extract_walls(contours: Contours, sigma_range: float, config: LandmarkConfig
         contours.points, contours.starts, contours.closed, sigma_range, config.min_wall, config.min_wall_points,
         config.position_floor, math.radians(config.angle_floor_deg),
     )  # fmt: skip
-    return Walls(rows[:, :4].reshape(-1, 2, 2), rows[:, 4:6], covariances, ends)
+    # Copies, for the same reason as a corner's.
+    return Walls(rows[:, :4].copy().reshape(-1, 2, 2), rows[:, 4:6].copy(), covariances, ends)

@@ -210,4 +210,4 @@ def vote(
                     (known[j, Y] - y - low[1]) / size, tx, ty, half / size, reach / size,
                 )  # fmt: skip
         count = _gather(mask, weights, corners, np.array([low[0], low[1], size, heading, step]), peaks, count)
-    return peaks[:count, :4]
+    return peaks[:count, :4].copy()  # a view of one row is contiguous, one of two is not: judge would be compiled twice

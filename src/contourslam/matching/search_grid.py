@@ -127,12 +127,12 @@ def directions_of(normals: Floats) -> Floats:
 
 def finite_points(points: Floats, normals: Floats | None, whose: str) -> tuple[Floats, Floats | None]:
     """Leave out points that are not finite; `whose` points they are is for the error message, on a wrong shape."""
-    points = np.asarray(points, np.float64)
+    points = np.ascontiguousarray(points, np.float64)  # the kernels are then compiled for one layout only
     if points.ndim != 2 or points.shape[1] != 2:
         raise ValueError(f"{whose} points have shape {points.shape}, wanted (n, 2)")
     good = np.isfinite(points)
     if normals is not None:
-        normals = np.asarray(normals, np.float64)
+        normals = np.ascontiguousarray(normals, np.float64)
         if normals.shape != points.shape:
             raise ValueError(f"{whose} normals have shape {normals.shape}, its points {points.shape}: they must agree")
         good &= np.isfinite(normals)

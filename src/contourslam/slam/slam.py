@@ -21,7 +21,7 @@ from contourslam.slam.measurement import predict_measurements
 from contourslam.slam.motion import predict
 from contourslam.slam.observation import Observations, loosened, observe, to_world
 from contourslam.slam.result import ScanUpdate
-from contourslam.slam.visibility import expected_in_scan
+from contourslam.slam.visibility import by_angle, expected_in_scan
 from contourslam.slam.wheels import Wheels
 
 # Doubt that a slip of the wheels adds to the pose: half a metre, ten degrees. At least three pairs must then agree,
@@ -215,13 +215,9 @@ class ContourSlam:
         f, config = self.filter, self.config
         f.refresh(landmarks, world)
         f.observed[landmarks] += 1
-        angles, ranges = scan.angles, scan.ranges
-        if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
-            way = np.argsort(angles, kind="stable")
-            angles, ranges = angles[way], ranges[way]
         limit = min(config.lidar.max_range, scan.range_max)
         should = expected_in_scan(
-            f.mean, f.table, f.count, compose_one(f.mean[:3], self.mount), angles, ranges, limit,
+            f.mean, f.table, f.count, compose_one(f.mean[:3], self.mount), *by_angle(scan), limit,
             config.landmarks.min_side, config.landmarks.min_side_points, config.landmarks.min_wall,
             config.landmarks.min_wall_points,
         )  # fmt: skip

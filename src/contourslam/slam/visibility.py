@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
 from contourslam.kernels import kernel
+from contourslam.scan import LaserScan
 from contourslam.slam.measurement import (
     ANCHOR_X,
     ANCHOR_Y,
@@ -80,6 +81,17 @@ def _sides_in_sight(
         if _beam_reaches(math.hypot(dx, dy), bearing, angles, ranges, max_range) != 1:
             return False
     return True
+
+
+def by_angle(scan: LaserScan) -> tuple[Floats, Floats]:
+    """Angles (rad) and ranges (m) of a scan in the order of rising angles, which :func:`expected_in_scan` needs."""
+    angles, ranges = scan.angles, scan.ranges
+    if (angles[1:] < angles[:-1]).any():  # a lidar that spins clockwise, or whose zero lies amid the scan
+        way = np.argsort(angles, kind="stable")
+        angles, ranges = angles[way], ranges[way]
+        # As a scan's own are: for arrays that may change, Numba compiles anew when the first such scan comes.
+        angles.flags.writeable = ranges.flags.writeable = False
+    return angles, ranges
 
 
 @kernel
