@@ -30,10 +30,12 @@ from contourslam.matching.search_grid import (
 Ints = NDArray[np.int64]
 Cells = NDArray[np.int32]
 Sums = NDArray[np.uint32]
+Flags = NDArray[np.bool_]
 
 WIDEST_STEP = 0.02  # rad; a heading step for points that all lie near the scan's origin
 NEAR, NEAR_ANGLE = 0.3, math.radians(5.0)  # m, rad: closer poses are one hypothesis
 ID_BITS, SCORE_BITS = 40, 22
+ANYWHERE: Flags = np.empty((0, 0), np.bool_)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,13 @@ def _claimed(
 
 
 @kernel
-def _search(
+def _stands(standing: Flags, y: int, x: int) -> bool:
+    """Whether a node holds a position that is allowed; without flags all are."""
+    return standing.size == 0 or bool(standing[y, x])
+
+
+@kernel
+def branch_and_bound(
     fields: tuple[Bytes, Bytes, Bytes, Bytes],
     top: Bytes,
     points: Floats,
@@ -176,14 +184,18 @@ def _search(
     theta: float,
     step: float,
     counts: tuple[int, int, int],
+    standing: tuple[Flags, Flags, Flags, Flags, Flags],
     bound: Sums,
     least: int,
     rival: float,
     near: float,
+    budget: int,
     found: Ints,
-) -> int:
+) -> tuple[int, int]:
     """Best poses as rows of `found`: heading, y and x as steps into the window, score; returns how many.
 
+    The second number is what no pose scores more than that was not looked at, as `found` is full or so many nodes were
+    looked at as the budget allows; 0 where all were.
     A key sorts by score, then nodes before poses (they may hold a pose of that score that comes first), then by place.
     """
     nt, ny, nx = counts
@@ -204,13 +216,16 @@ def _search(
             for y in range(up):
                 for x in range(x0, min(x0 + width, (nx + BLOCK - 1) // BLOCK)):
                     score = int(bound[y * width + x - x0])
-                    if score >= least:
+                    if score >= least and _stands(standing[TOP], y * BLOCK, x * BLOCK):
                         place = ((TOP * nt + t) * ny + y * BLOCK) * nx + x * BLOCK
                         heap = _push(heap, size, (((score << 1) | 1) << ID_BITS) | (mask - place))
                         size += 1
-    while size > 0 and count < found.shape[0]:
+    while size > 0:
+        if count == found.shape[0] or budget == 0:
+            return count, heap[0] >> (ID_BITS + 1)
         key = _pop(heap, size)
         size -= 1
+        budget -= 1
         if key >> (ID_BITS + 1) < least:
             break
         place = mask - (key & mask)
@@ -234,11 +249,11 @@ def _search(
             _score(fields[level], entries, own, x >> shift, y >> shift, half >> shift, least, scores)
             for c in range(4):
                 cx, cy = x + (c & 1) * half, y + (c >> 1) * half
-                if scores[c] >= least and cx < nx and cy < ny:
+                if scores[c] >= least and cx < nx and cy < ny and _stands(standing[level], cy, cx):
                     place = ((level * nt + s) * ny + cy) * nx + cx
                     heap = _push(heap, size, (((scores[c] << 1) | (level > 0)) << ID_BITS) | (mask - place))
                     size += 1
-    return count
+    return count, 0
 
 
 def search(
@@ -313,7 +328,7 @@ def search(
     mixed = np.argsort(np.arange(len(points)) * 0.6180339887498949 % 1.0)
     rows, width = -(-counts[1] // BLOCK), grid.top.shape[4]
     found = np.empty((keep, 4), np.int64)
-    count = _search(
+    count, _ = branch_and_bound(
         grid.fields,
         grid.top,
         points[mixed] / grid.cell,
@@ -322,10 +337,12 @@ def search(
         float(middle[2]) - headings * step,
         step,
         counts,
+        (ANYWHERE,) * 5,
         np.empty(rows * width, np.uint32),
         max(math.ceil(min_score * 255 * len(points)), 1),
         rival,
         NEAR / grid.cell,
+        -1,
         found,
     )
     offsets = (found[:count, 2::-1] - (kx, ky, headings)) * (grid.cell, grid.cell, step)
