@@ -198,6 +198,8 @@ class LiveConfig:
     """... where it is larger than this, m ..."""
     large_correction_deg: float = 30.0
     """... or turns by more than this, degrees."""
+    give_up_after: float = 20.0
+    """A robot that is not found again in its own map within this time, s, begins a new one."""
     autosave_period: float = 60.0
     """A map is saved by itself this often while it changes, s; 0 for never."""
     late_after: float = 0.1
@@ -211,7 +213,7 @@ class LiveConfig:
         _check_positive(
             self, "wait", "max_waiting", "silent_after", "jump_back", "max_speed", "max_turn_rate_deg",
             "smooth_turn_rate_deg", "smooth_within", "large_correction", "large_correction_deg", "late_after",
-            "remember",
+            "give_up_after", "remember",
         )  # fmt: skip
         for name in ("odometry_slack", "smooth_speed", "autosave_period", "poor_quality"):
             value = getattr(self, name)

@@ -20,12 +20,14 @@ class Backing:
     Attributes
     ----------
     begin : callable
-        Make the mapper to start with, and again after a reset.
+        Make a mapper that begins anew.
     lost : callable
         Given a mapper whose robot may be anywhere now, and about where somebody says it is (None: nobody does), make
         the mapper that goes on; it may be the same one.
     localized : callable
         Whether a mapper knows where the robot is; it always does by default.
+    first : callable or None
+        Make the mapper to start with; as `begin` by default.
     keep : callable or None
         Make a map to be saved of a mapper; None where that cannot be done.
     open : callable or None
@@ -41,6 +43,7 @@ class Backing:
     begin: Callable[[], Mapper]
     lost: Callable[[Mapper, Floats | None], Mapper]
     localized: Callable[[Mapper], bool] = _always
+    first: Callable[[], Mapper] | None = None
     keep: Callable[[Mapper], SavedMap] | None = None
     open: Callable[[SavedMap], Mapper] | None = None
     write: Callable[[Path, SavedMap], None] | None = None

@@ -77,7 +77,7 @@ class Course:
 
     def __init__(self, backing: Backing, config: LiveConfig, odometry_lag: float) -> None:
         self._backing, self._lag = backing, odometry_lag
-        self.mapper = backing.begin()
+        self.mapper = (backing.first or backing.begin)()
         self._odometry = ContinuousOdometry(config)
         self.leap = 0.0
 

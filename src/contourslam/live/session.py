@@ -200,7 +200,7 @@ class Session:
         self._note(
             "jump",
             f"time ran back by {back:.1f} s, as where a recording or a simulation begins again: "
-            + ("the robot is looked for anew" if self._backing.fixed else "the drive is begun anew"),
+            + ("a new map is begun" if self._course.localized else "the robot is looked for in the map"),
         )
 
     def _note(self, what: str, text: str) -> None:
