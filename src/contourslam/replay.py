@@ -1,8 +1,9 @@
 """A recording, message by message, through the streaming object."""
 
+import sys
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from time import thread_time
 
 import numpy as np
@@ -10,14 +11,16 @@ import numpy as np
 from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.detectors import Detector
-from contourslam.errors import RecordingError
+from contourslam.errors import ConfigError, MapError, RecordingError
 from contourslam.geometry.poses import between, compose, interpolate
+from contourslam.maps.saved_map import NOT_CONTINUABLE, SavedMap
 from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.slam.mapper import Mapper
 from contourslam.slam.result import OdometryReadings, RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
 Message = LaserScan | Odometry | TruePose
+MakeMapper = Callable[..., Mapper]
 BLIND = "scans before any odometry, mapped all the same"
 
 
@@ -63,6 +66,76 @@ def make_mapper(
     return ContourSlam(config, detector, initial_pose=initial_pose, lidar_mount=lidar_mount, lap=lap)
 
 
+def check_continuable(saved: SavedMap, config: Config) -> None:
+    """Refuse what a further drive cannot go on in.
+
+    Raises
+    ------
+    MapError
+        If the map does not hold all that is needed: one of landmarks alone, or a file of version 1.
+    ConfigError
+        If the configuration names the filter, which begins a new map each time.
+    MissingExtraError
+        If GTSAM is not installed.
+    """
+    if config.back_end != "graph":
+        raise ConfigError(f"a map is continued by the graph, not by {config.back_end}; choose --back-end graph")
+    if not saved.continuable:
+        raise MapError(NOT_CONTINUABLE)
+
+
+def continue_mapper(
+    saved: SavedMap,
+    covariance: Floats,
+    config: Config,
+    detector: Detector | None = None,
+    *,
+    initial_pose: Floats,
+    lidar_mount: Floats | None = None,
+    lap: Callable[[str], None] = lambda stage: None,
+) -> Mapper:
+    """Make a mapper that goes on in a map that was kept.
+
+    Parameters
+    ----------
+    saved : SavedMap
+    covariance : ndarray, shape (3, 3)
+        Of `initial_pose`, in the axes of the map.
+    initial_pose : ndarray, shape (3,)
+        Base in the frame of the map where the drive begins: m, m, rad.
+    config, detector, lidar_mount, lap
+        As of :func:`make_mapper`.
+
+    Raises
+    ------
+    ContourslamError
+        As :func:`check_continuable`.
+    ConfigError
+        If the configuration names a detector that does not exist.
+    """
+    check_continuable(saved, config)
+    from contourslam.graph import resume
+
+    return resume(config, saved, initial_pose, covariance, detector=detector, lidar_mount=lidar_mount, lap=lap)
+
+
+def keep_map(mapper: Mapper, about: Mapping[str, str]) -> SavedMap:
+    """Give the map of a mapper as it is kept: all that a graph knows, of another its landmarks. The drive may go on.
+
+    Parameters
+    ----------
+    mapper : Mapper
+    about : mapping of str to str
+        What people want to know of the map.
+    """
+    if "contourslam.graph" in sys.modules:  # else GTSAM may not be installed, and the mapper is no graph
+        from contourslam.graph import GraphSlam, kept
+
+        if isinstance(mapper, GraphSlam):
+            return kept(mapper, about)
+    return SavedMap(mapper.corner_map(), mapper.wall_map(), about=dict(about))
+
+
 def replay(
     messages: Iterable[Message],
     config: Config,
@@ -71,6 +144,7 @@ def replay(
     initial_pose: Floats | None = None,
     lidar_mount: Floats | tuple[float, float, float] | None = None,
     on_scan: Callable[[LaserScan, ScanUpdate], None] | None = None,
+    make: MakeMapper = make_mapper,
 ) -> RunResult:
     """Run the filter over the messages of a recording.
 
@@ -91,6 +165,9 @@ def replay(
         ``T_base_lidar``; that of the configuration by default.
     on_scan : callable, optional
         Called after each scan, for progress and pictures.
+    make : callable
+        Makes the mapper, with the arguments of :func:`make_mapper`: one that goes on in a map, or that is looked at
+        afterwards.
 
     Returns
     -------
@@ -126,7 +203,7 @@ def replay(
                 start = initial_pose
                 if start is None and truth:
                     start = _pose_at(truth, np.array([message.stamp]))[0]
-                slam = make_mapper(config, detector, initial_pose=start, lidar_mount=mount, lap=watch)
+                slam = make(config, detector, initial_pose=start, lidar_mount=mount, lap=watch)
             for reading in waiting:
                 slam.push_odometry(reading)
             waiting.clear()
@@ -148,7 +225,7 @@ def replay(
     if slam is None:
         if complete:
             raise RecordingError("the recording holds no scan")
-        slam = make_mapper(config, detector, initial_pose=initial_pose, lidar_mount=mount)
+        slam = make(config, detector, initial_pose=initial_pose, lidar_mount=mount)
     return _result(config, slam, done, readings, truth, watch, dict(skipped), complete)
 
 

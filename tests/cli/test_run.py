@@ -22,6 +22,7 @@ FILES = {
     "trajectory.tum",
     *(["trajectory_online.tum"] if GRAPH else []),
     "index.html",
+    "map.cmap",
     "map.geojson",
     "map.svg",
     "odometry.tum",

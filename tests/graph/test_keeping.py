@@ -49,9 +49,9 @@ def half() -> int:
 
 
 def part(first: int, until: int) -> list[Message]:
-    """The drive from one scan to another."""
+    """The drive from one scan to another, with the odometry just before."""
     ends = [i for i, message in enumerate(drive()) if isinstance(message, LaserScan)]
-    return list(drive()[ends[first] : ends[until - 1] + 1])
+    return list(drive()[ends[first - 1] + 1 if first else 0 : ends[until - 1] + 1])
 
 
 def feed(slam: GraphSlam, messages: Iterable[Message]) -> None:
@@ -226,14 +226,14 @@ def test_what_the_robot_saw_last_is_a_place_to_the_next_drive() -> None:
 
 def test_a_map_of_nothing_is_kept_and_cannot_be_continued(tmp_path: Path) -> None:
     save_map(tmp_path / "map.cmap", kept(GraphSlam(CONFIG), {}))
-    with pytest.raises(MapError, match="holds no keyframe"):
+    with pytest.raises(MapError, match="it holds no keyframes"):
         go_on(load_map(tmp_path / "map.cmap"), np.zeros(3))
 
 
 @pytest.mark.parametrize("lacking", ["keyframes", "relations", "seen", "stretches"])
 def test_a_map_that_lacks_what_is_needed_says_so(lacking: str) -> None:
     saved = replace(first_map(), **{lacking: None})  # type: ignore[arg-type] # all four may be None
-    with pytest.raises(MapError, match=r"cannot be continued, it holds .*; map anew"):
+    with pytest.raises(MapError, match="cannot be continued: it holds no keyframes, or .*; map anew"):
         go_on(saved, np.zeros(3))
 
 

@@ -11,9 +11,10 @@ import tyro
 
 from contourslam.cli.console import complain, note, prepare_folder, print_json, progress
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt, UntilStopped
+from contourslam.cli.kept_map import KeptMap
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
 from contourslam.config import Config, SlamConfig
-from contourslam.errors import ConfigError, RecordingError
+from contourslam.errors import ConfigError, MapError, RecordingError
 
 if TYPE_CHECKING:
     from contourslam.recordings import Message, Recording
@@ -35,10 +36,14 @@ class Run:
     """Map a recording: trajectory and map of corners and walls, into a folder.
 
     The recording is a rosbag (1, 2, MCAP) or a CARMEN log, plain, .gz or .xz. The folder gets index.html (a page about
-    the run), map.svg, map.geojson, trajectory.tum (a pose at each scan and odometry reading), metrics.json, scans.csv
-    and config.yaml, and where the run has them trajectory_online.tum (poses as known at the time, before the
-    refinement), odometry.tum, loops.csv (the closed loops with their evidence) and relation_errors.csv; with --grid
-    also map.pgm and map.yaml for Nav2's map server. Ctrl-C stops and keeps what is done.
+    the run), map.svg, map.geojson, map.cmap (the map for other runs and robots), trajectory.tum (a pose at each scan
+    and odometry reading), metrics.json, scans.csv and config.yaml, and where the run has them trajectory_online.tum
+    (poses as known at the time, before the refinement), odometry.tum, loops.csv (the closed loops with their evidence)
+    and relation_errors.csv; with --grid also map.pgm and map.yaml for Nav2's map server. Ctrl-C stops and keeps what is
+    done.
+
+    With --map the drive goes on in the map of an earlier run: its start is looked for there, corners and walls keep
+    their ids, and map.cmap holds both drives.
 
     The back end is the graph, which closes loops and refines the whole map at the end, wherever the extra `graph`
     (GTSAM) is installed, else the paper's filter (ekf); --back-end chooses.
@@ -66,6 +71,10 @@ class Run:
     """Use every n-th scan only."""
     max_scans: int | None = None
     """Stop after this many scans."""
+    map: Path | None = None
+    """Go on in this map, the map.cmap of an earlier run in the same building; the graph can."""
+    initial_pose: tuple[float, float, float] | None = None
+    """Where the drive begins: x (m), y (m), heading (degrees); in a map to go on in roughly, else it is looked for."""
     grid: Flag = False
     """Render an occupancy grid for Nav2 too (map.pgm, map.yaml); it costs a second reading of the recording."""
     json: Json = False
@@ -115,7 +124,7 @@ def _chosen(recording: "Recording", options: Run) -> "Iterator[Message]":
             return
 
 
-class _Opening:
+class Opening:
     """The first scans of a recording, kept for a rehearsal, so that the recording is read only once."""
 
     def __init__(self, messages: "Iterator[Message]") -> None:
@@ -131,6 +140,18 @@ class _Opening:
                 self.scans += isinstance(message, LaserScan)
                 if self.scans == _WARM_UP:
                     break
+        except RecordingError as error:
+            self._error = error
+
+    def growing(self) -> "Iterator[Message]":
+        """Yield these, and then what follows them, which is kept too."""
+        yield from self.messages
+        if self._error is not None:
+            return  # raised when the recording is mapped
+        try:
+            for message in self._rest:
+                self.messages.append(message)
+                yield message
         except RecordingError as error:
             self._error = error
 
@@ -153,6 +174,7 @@ def _run(options: Run, command: str) -> int:
 
     settings = options.settings
     make_detector(settings.detector)  # an unknown name fails before any work is done
+    continued = KeptMap(settings, options.map, options.initial_pose)
     relations = None if options.relations is None else read_relations(options.relations)
     recording = open_recording(
         options.recording,
@@ -165,11 +187,15 @@ def _run(options: Run, command: str) -> int:
     with Interrupt() as interrupt:
         messages = UntilStopped(_chosen(recording, options), interrupt)
         try:
-            opening = _Opening(iter(messages))
+            opening = Opening(iter(messages))
             if opening.scans:  # to compile or to load the kernels is no part of the time per scan
                 replay(opening.messages, settings, lidar_mount=mount)
-            result = replay(progress(opening.whole(), "message"), settings, lidar_mount=mount)
-        except RecordingError:
+            continued.find_start(opening, mount)
+            result = replay(
+                progress(opening.whole(), "message"), settings, initial_pose=continued.pose, lidar_mount=mount,
+                make=continued.make,
+            )  # fmt: skip
+        except (RecordingError, MapError):
             if interrupt.requested:  # it holds no scan because we stopped before the first
                 raise KeyboardInterrupt from None
             raise
@@ -186,7 +212,8 @@ def _run(options: Run, command: str) -> int:
         if grid is None:  # an earlier run's would not belong to this one
             for name in ("map.pgm", "map.yaml"):
                 (options.output / name).unlink(missing_ok=True)
-        for text in recording.notes:
+        continued.keep(options.output / "map.cmap", options.recording.name)
+        for text in (*recording.notes, *continued.notes):
             note(text)
         _tell(options, metrics)
     if messages.error is not None:

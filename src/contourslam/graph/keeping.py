@@ -17,7 +17,7 @@ from contourslam.graph.places import Keyframe, Place
 from contourslam.graph.pose_graph import joined, poses_of, to_array
 from contourslam.graph.regrown import regrow
 from contourslam.graph.slam import GraphSlam
-from contourslam.maps.saved_map import Contoured, Relations, SavedMap, Seen, Stretches
+from contourslam.maps.saved_map import NOT_CONTINUABLE, Contoured, Relations, SavedMap, Seen, Stretches
 
 
 def kept(slam: GraphSlam, about: Mapping[str, str]) -> SavedMap:
@@ -164,9 +164,8 @@ def resume(
         If the configuration names a detector that does not exist.
     """
     keyframes, relations, seen, stretches = saved.keyframes, saved.relations, saved.seen, saved.stretches
-    if keyframes is None or relations is None or seen is None or stretches is None or not len(keyframes):
-        lacks = "no keyframe" if keyframes is None or not len(keyframes) else "keyframes, but not what binds them"
-        raise MapError(f"this map cannot be continued, it holds {lacks}; map anew with --back-end graph")
+    if not keyframes or relations is None or seen is None or stretches is None:
+        raise MapError(NOT_CONTINUABLE)
     detector = detector or make_detector(config.detector, adapted=config.adapted)
     mount = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
     memory = Memory(config, detector, mount)

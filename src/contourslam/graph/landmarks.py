@@ -116,6 +116,7 @@ class Landmarks:
         self._in_graph: set[int] = set()
         self._home: dict[int, tuple[int, Floats]] = {}  # of earlier drives: by id, the keyframe they move with, and how
         self.failures: list[int] = []  # by id
+        self._named: tuple[Floats, tuple[LandmarkSet, Ints, Ints]] | None = None
         self._mapped: tuple[Floats, tuple[CornerMap, WallMap]] | None = None
 
     def take(
@@ -197,8 +198,11 @@ class Landmarks:
 
     def named(self, poses: Floats) -> tuple[LandmarkSet, Ints, Ints]:
         """What the keyframes at these `poses` saw, good or not, their ids, and how often each was missed."""
-        found = find_landmark_set(self.sightings, poses)
-        return found, *records(found, self.sightings.ids[: self.sightings.count], self.failures)
+        if self._named is None or not np.array_equal(self._named[0], poses):
+            found = find_landmark_set(self.sightings, poses)
+            names = records(found, self.sightings.ids[: self.sightings.count], self.failures)
+            self._named = poses.copy(), (found, *names)
+        return self._named[1]
 
     def recall(self, seen: Seen, nodes: list[int], poses: Floats) -> None:
         """Take in, before anything else, what keyframes at `poses` saw on earlier drives, the `nodes` being theirs."""

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
+NOT_CONTINUABLE = (
+    "the map cannot be continued: it holds no keyframes, or not what binds them; map anew with --back-end graph"
+)
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -143,3 +146,9 @@ class SavedMap:
     seen: Seen | None = None
     stretches: Stretches | None = None
     about: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def continuable(self) -> bool:
+        """Whether it holds all that a further drive needs to go on in it."""
+        parts = (self.keyframes, self.relations, self.seen, self.stretches)
+        return all(part is not None for part in parts) and bool(self.keyframes)
