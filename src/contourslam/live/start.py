@@ -1,18 +1,21 @@
 """Sessions ready to use, one for mapping and one for localisation: what a node or a command needs to know."""
 
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from pathlib import Path
 
+from contourslam import __version__
 from contourslam.config import Config, LiveConfig
 from contourslam.contour.contours import Floats
-from contourslam.errors import ConfigError
+from contourslam.errors import ConfigError, MapError
 from contourslam.live.backing import Backing
 from contourslam.live.events import Source
+from contourslam.live.resuming import Resuming
 from contourslam.live.session import Session
 from contourslam.localization.follow import Localizer
 from contourslam.maps.file import load_map, save_map
 from contourslam.maps.saved_map import SavedMap
-from contourslam.replay import make_mapper
+from contourslam.replay import keep_map, make_mapper
 from contourslam.slam.mapper import Mapper
 
 
@@ -39,7 +42,8 @@ def mapping(
     autosave : Path, optional
         Where the map is saved by itself.
     initial_pose : ndarray, shape (3,), optional
-        Of the base in a new map; the origin by default.
+        Of the base in a new map, the origin by default; about where it is in one that is continued, where it is looked
+        for everywhere by default.
     lidar_mount : ndarray, shape (3,), optional
         ``T_base_lidar``; that of the configuration by default.
     clock, topics, expects_odometry
@@ -54,22 +58,41 @@ def mapping(
     def begin(pose: Floats | None = initial_pose) -> Mapper:
         return make_mapper(config, initial_pose=pose, lidar_mount=lidar_mount)
 
-    def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
-        return begin(initial_pose if pose is None else pose)
-
     def keep(mapper: Mapper) -> SavedMap:
-        return SavedMap(mapper.corner_map(), mapper.wall_map())
+        about = {
+            "contourslam": __version__,
+            "back_end": config.back_end,
+            "detector": config.detector,
+            "made": datetime.now().astimezone().isoformat(timespec="seconds"),
+        }
+        return mapper.keep(about) if isinstance(mapper, Resuming) else keep_map(mapper, about)
+
+    def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
+        known = keep(mapper)
+        if config.back_end != "graph" or known.keyframes is None or not len(known.keyframes):
+            return begin(initial_pose if pose is None else pose)
+        wait = live.give_up_after
+        return Resuming(known, config, initial_pose=pose, lidar_mount=lidar_mount, give_up_after=wait, begin=begin)
+
+    def go_on(saved: SavedMap, pose: Floats | None = None) -> Mapper:
+        if config.back_end != "graph":
+            raise ConfigError(f"a map is continued by the graph, not by {config.back_end}; choose --back-end graph")
+        if saved.relations is None:
+            raise MapError("this map cannot be continued, it holds landmarks alone; localise in it, or map anew")
+        return Resuming(saved, config, initial_pose=pose, lidar_mount=lidar_mount)
+
+    first = None
+    if map_file is not None:
+        continued = load_map(map_file)
+
+        def first() -> Mapper:
+            return go_on(continued, initial_pose)
 
     backing = Backing(
-        begin=begin,
-        lost=lost,
-        keep=keep,
-        write=save_map,
-        read=load_map,
+        begin=begin, first=first, lost=lost, localized=lambda m: not isinstance(m, Resuming) or m.localized, keep=keep,
+        open=go_on, write=save_map, read=load_map,
         guesses=config.back_end == "graph" or config.slam.contour_matching,
-    )
-    if map_file is not None:
-        raise ConfigError(f"{map_file}: maps cannot be continued yet; localise in it, or begin a new one")
+    )  # fmt: skip
     return Session(
         backing, live, odometry_lag=config.slam.odometry_lag, autosave=autosave, clock=clock, topics=topics,
         expects_odometry=expects_odometry,
