@@ -5,37 +5,36 @@ from collections import OrderedDict, deque
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from contourslam_msgs.msg import LandmarkMap
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import MarkerArray
 
 from contourslam.errors import ContourslamError
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.live.events import Source
-from contourslam.live.session import Processed, Session
+from contourslam.live.processed import Processed
+from contourslam.live.session import Session
+from contourslam.live.warming import warm_up
 from contourslam.live.worker import Worker
 from contourslam.scan import LaserScan, Odometry
 from contourslam_ros.frames import SENT
 from contourslam_ros.latency import Latencies
-from contourslam_ros.markers import map_markers
-from contourslam_ros.messages import diagnostic_message, header, landmark_message, pose_message, transform_message
+from contourslam_ros.map_sender import MapSender
+from contourslam_ros.messages import diagnostic_message, header, pose_message, transform_message
 from contourslam_ros.sensors import Sensors
 from contourslam_ros.services import Services
 from contourslam_ros.settings import declared
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 HELD = 200  # odometry readings before the first scan
 
 
 class LiveNode(Node):
     """A node around a session; what the session is for is said by :meth:`begin`.
 
-    The node's thread takes in messages and sends the map; the worker's thread makes poses and sends them at once.
+    The node's thread takes in messages. The worker's thread makes poses and sends them at once; and the map right after
+    a pose, when the next scan is farthest off.
 
     Parameters
     ----------
@@ -63,29 +62,36 @@ class LiveNode(Node):
         self._session: Session | None = None
         self._worker: Worker | None = None
         self._early: deque[Odometry] = deque(maxlen=HELD)
-        self._arrived: OrderedDict[float, tuple[Time, int]] = (
-            OrderedDict()
-        )  # of each scan: its stamp to the bit, and when it came
+        # Of each scan, its stamp to the bit and when it came.
+        self._arrived: OrderedDict[float, tuple[Time, int]] = OrderedDict()
         self._latencies = Latencies()
-        self._sent_version = -1
 
     def begin(self, mount: np.ndarray) -> Session:
         """Make the session, now that it is known where the lidar sits (``T_base_lidar``, shape (3,))."""
         raise NotImplementedError
 
+    def warm_up(self) -> None:
+        """Have everything compiled before the first scan comes."""
+        warm_up(self.settings.core)
+
+    @property
+    def topics(self) -> dict[Source, str]:
+        """What the sensors' messages come on, for people."""
+        odometry = "/tf" if self.config.odometry == "tf" else self.resolve_topic_name("odom")
+        return {"scan": self.resolve_topic_name("scan"), "odometry": odometry}
+
     def start(self) -> None:
         """Publish and subscribe; from here on messages come in."""
         self._poses = self.create_publisher(PoseWithCovarianceStamped, "pose", 10)
-        self._landmarks = self.create_publisher(LandmarkMap, "landmarks", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "markers", LATCHED)
+        self._map = MapSender(self, self.config)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._transforms = self.create_publisher(TFMessage, "/tf", SENT)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(self.config.map_period, self._send_map, clock=steady)
         self.create_timer(1.0, self._send_diagnostics, clock=steady)
+        self.create_timer(self.config.map_period, self._send_map_when_idle, clock=steady)
         if self.config.publish_tf and self.config.odometry != "none":
             self.create_timer(self.config.tf_period, self._send_transform, clock=steady)
-        Services(self, self._running, self.config.map_file)
+        Services(self, self.running, self.config.map_file)
         self._sensors.listen()
 
     def stop(self) -> None:
@@ -94,12 +100,14 @@ class LiveNode(Node):
             self._worker.stop()
             self._worker = self._session = None
 
-    def restart(self) -> None:
-        """Begin a new session with the next scan."""
-        self.stop()
-        self._sent_version = -1
+    def running(self) -> Session:
+        """Give the session.
 
-    def _running(self) -> Session:
+        Raises
+        ------
+        ContourslamError
+            While there is none; the message says what is missing.
+        """
         if self._session is None:
             raise ContourslamError(self._sensors.trouble)
         return self._session
@@ -136,12 +144,16 @@ class LiveNode(Node):
     def _on_done(self, done: Processed) -> None:
         """Send the pose; called in the worker's thread."""
         stamp, came = self._arrived.pop(done.stamp)
+        if not done.localized:
+            return
         head = header(stamp, self.config.frame(self.config.map_frame))
         self._poses.publish(pose_message(head, done.T_map_base, done.covariance))
         self._latencies.add((time.monotonic_ns() - came) * 1e-9)
         if self.config.publish_tf and self.config.odometry == "none":
             base = transform_message(head, self.config.frame(self.config.base_frame), done.T_map_base)
             self._transforms.publish(TFMessage(transforms=[base]))
+        if self._session is not None:
+            self._map.send(self._session)
 
     def _on_failure(self, error: BaseException) -> None:
         self.failure = error
@@ -156,15 +168,10 @@ class LiveNode(Node):
         odom = transform_message(head, self.config.frame(self.config.odom_frame), correction)
         self._transforms.publish(TFMessage(transforms=[odom]))
 
-    def _send_map(self) -> None:
-        session = self._session
-        if session is None or not session.map_changed(self._sent_version):
-            return
-        self._sent_version = session.map_version
-        corners, walls = session.corner_map(), session.wall_map()
-        head = header(self.get_clock().now().to_msg(), self.config.frame(self.config.map_frame))
-        self._landmarks.publish(landmark_message(head, corners, walls))
-        self._markers.publish(map_markers(head, corners, walls, self.config.ellipse_sigmas))
+    def _send_map_when_idle(self) -> None:
+        """Send what nobody else does: the map after the last scan, or one just loaded."""
+        if self._session is not None:
+            self._map.send(self._session, slack=self.config.map_period)
 
     def _send_diagnostics(self) -> None:
         if self._session is None:

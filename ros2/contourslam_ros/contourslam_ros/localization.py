@@ -1,12 +1,15 @@
 """Node ``localization``: tells the robot where it is in a map that is kept as it is."""
 
+import sys
+import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
-from contourslam.errors import ConfigError, ScanError
+from contourslam.errors import ConfigError, ContourslamError
+from contourslam.live.rehearsal import stages
 from contourslam.live.session import Session
 from contourslam.live.start import localization
 from contourslam.recordings.ros_messages import POSE_COVARIANCE, odometry_from
@@ -21,18 +24,25 @@ class Localization(LiveNode):
         super().__init__("localization")
         if not self.config.map_file:
             raise ConfigError("localization needs a map: give its file as the parameter map_file")
-        self._guess: np.ndarray | None = None
 
     def begin(self, mount: np.ndarray) -> Session:
-        """Localise in the map, near the first guess where there is one."""
+        """Localise in the map."""
         return localization(
             self.settings.core,
             self.settings.live,
             Path(self.config.map_file).expanduser().absolute(),
-            initial_pose=self._guess,
             lidar_mount=mount,
             clock=time.monotonic,
+            topics=self.topics,
+            expects_odometry=self.config.odometry != "none",
         )
+
+    def warm_up(self) -> None:
+        """Map a made-up building and localise in it, so that all that takes is compiled."""
+        with tempfile.TemporaryDirectory() as folder:
+            work = dict(stages(Path(folder)))
+            next(iter(work.values()))()
+            work["localising"]()
 
     def start(self) -> None:
         """Publish and subscribe; RViz's "2D Pose Estimate" gives a first guess."""
@@ -41,13 +51,15 @@ class Localization(LiveNode):
 
     def _on_guess(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self._guess = odometry_from(message, POSE_COVARIANCE).pose
-        except ScanError as error:
+            self.running().lost(odometry_from(message, POSE_COVARIANCE).pose)
+        except ContourslamError as error:
             self.get_logger().error(f"initialpose: {error}")
-            return
-        self.restart()
 
 
 def main() -> int:
     """Run the node until it is told to stop."""
     return run(Localization)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

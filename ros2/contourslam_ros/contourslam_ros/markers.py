@@ -35,27 +35,22 @@ def map_markers(head: Header, corners: CornerMap, walls: WallMap, sigmas: float)
         Markers ``corners``, ``corner_sides``, ``corner_ellipses``, ``walls`` and ``wall_ellipses``.
     """
     ends = walls.end_points.reshape(-1, 2)
-    doubts = walls.end_point_covariances.reshape(-1, 2, 2)
+    end_covariances = walls.end_point_covariances.reshape(-1, 2, 2)
+    corner_ellipses = _outlines(corners.positions, corners.covariances, sigmas)
+    wall_ellipses = _outlines(ends, end_covariances, sigmas)
     return MarkerArray(
         markers=[
-            _marker(head, "walls", Marker.LINE_LIST, ends, 0.03, WALL),
-            _marker(head, "wall_ellipses", Marker.LINE_LIST, ellipses(ends, doubts, sigmas), 0.008, ELLIPSE),
-            _marker(head, "corners", Marker.SPHERE_LIST, corners.positions, 0.08, CORNER),
-            _marker(head, "corner_sides", Marker.LINE_LIST, _sides(corners), 0.02, CORNER),
-            _marker(
-                head,
-                "corner_ellipses",
-                Marker.LINE_LIST,
-                ellipses(corners.positions, corners.covariances, sigmas),
-                0.008,
-                ELLIPSE,
-            ),
+            _marker(head, "walls", Marker.LINE_LIST, _points(ends), 0.03, WALL),
+            _marker(head, "wall_ellipses", Marker.LINE_LIST, wall_ellipses, 0.008, ELLIPSE),
+            _marker(head, "corners", Marker.SPHERE_LIST, _points(corners.positions), 0.08, CORNER),
+            _marker(head, "corner_sides", Marker.LINE_LIST, _points(_sides(corners)), 0.02, CORNER),
+            _marker(head, "corner_ellipses", Marker.LINE_LIST, corner_ellipses, 0.008, ELLIPSE),
         ]
     )
 
 
 def ellipses(centres: Floats, covariances: Floats, sigmas: float) -> Floats:
-    """Outline ellipses with line segments.
+    """Outline ellipses.
 
     Parameters
     ----------
@@ -68,16 +63,29 @@ def ellipses(centres: Floats, covariances: Floats, sigmas: float) -> Floats:
 
     Returns
     -------
-    ndarray, shape (n * steps * 2, 2)
-        First and last point of each segment in turn, m.
+    ndarray, shape (n, steps, 2)
+        Points around each, m.
     """
-    if not len(centres):
-        return np.empty((0, 2))
     values, axes = np.linalg.eigh(covariances)
     halves = axes * (sigmas * np.sqrt(np.maximum(values, 0.0)))[:, None, :]
-    angle = 2.0 * np.pi * np.arange(STEPS + 1) / STEPS
-    outline = centres[:, None] + np.einsum("nij,kj->nki", halves, np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    return np.stack([outline[:, :-1], outline[:, 1:]], axis=2).reshape(-1, 2)
+    angle = 2.0 * np.pi * np.arange(STEPS) / STEPS
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outlines: Floats = centres[:, None] + np.einsum("nij,kj->nki", halves, circle)
+    return outlines
+
+
+def _outlines(centres: Floats, covariances: Floats, sigmas: float) -> list[Point]:
+    """Outline ellipses with line segments; neighbours share their point, for to make one takes microseconds."""
+    segments: list[Point] = []
+    for outline in ellipses(centres, covariances, sigmas).tolist():
+        around = [Point(x=x, y=y) for x, y in outline]
+        for first, second in zip(around, around[1:] + around[:1], strict=True):
+            segments += (first, second)
+    return segments
+
+
+def _points(places: Floats) -> list[Point]:
+    return [Point(x=x, y=y) for x, y in places.tolist()]
 
 
 def _sides(corners: CornerMap) -> Floats:
@@ -90,15 +98,15 @@ def _sides(corners: CornerMap) -> Floats:
 
 
 def _marker(
-    head: Header, name: str, kind: int, points: Floats, size: float, colour: tuple[float, float, float]
+    head: Header, name: str, kind: int, points: list[Point], size: float, colour: tuple[float, float, float]
 ) -> Marker:
     marker = Marker(header=head, ns=name, type=kind)
-    if not len(points):  # RViz complains of a list without points
+    if not points:  # RViz complains of a list without points
         marker.action = Marker.DELETE
         return marker
     marker.pose.orientation.w = 1.0
     marker.scale.x = marker.scale.y = marker.scale.z = size
     red, green, blue = colour
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
-    marker.points = [Point(x=x, y=y) for x, y in points.tolist()]
+    marker.points = points
     return marker

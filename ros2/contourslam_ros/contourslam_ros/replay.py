@@ -41,3 +41,7 @@ def main() -> int:
         config = Path(folder) / "config.yaml"
         write_config(config, settings.core)
         return contourslam([*arguments, "--config", str(config)])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

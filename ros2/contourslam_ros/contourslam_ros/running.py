@@ -1,5 +1,6 @@
 """The life of a node: warm, running, stopped in order, and one line where it cannot go on."""
 
+import gc
 import sys
 from collections.abc import Callable
 
@@ -17,8 +18,11 @@ def run(make: Callable[[], LiveNode]) -> int:
     node = None
     try:
         node = make()
+        node.get_logger().info("warming up, which takes a minute when it is the first time on this machine")
         node.warm_up()
+        gc.freeze()  # what stays is not looked through again: that would hold up a scan for a tenth of a second
         node.start()
+        node.get_logger().info(f"ready: waiting for {' and '.join(node.topics.values())}")
         while rclpy.ok() and node.failure is None:
             rclpy.spin_once(node, timeout_sec=0.5)
         if node.failure is not None:

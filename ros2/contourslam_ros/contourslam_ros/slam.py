@@ -1,5 +1,6 @@
 """Node ``slam``: maps while the robot drives."""
 
+import sys
 import time
 from pathlib import Path
 
@@ -27,9 +28,15 @@ class Slam(LiveNode):
             autosave=path,
             lidar_mount=mount,
             clock=time.monotonic,
+            topics=self.topics,
+            expects_odometry=self.config.odometry != "none",
         )
 
 
 def main() -> int:
     """Run the node until it is told to stop."""
     return run(Slam)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

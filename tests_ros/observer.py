@@ -1,0 +1,110 @@
+"""Listens to a node in a thread of its own."""
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import rclpy
+from contourslam_msgs.msg import LandmarkMap
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
+
+from contourslam.geometry.poses import between
+from contourslam.recordings.ros_messages import POSE_COVARIANCE, odometry_from
+from contourslam.simulation.simulate import SimulatedRun
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Observer:
+    """What was heard so far.
+
+    Attributes
+    ----------
+    poses : list of (float, float, ndarray, ndarray)
+        When each came (monotonic), its stamp, pose (3,) and covariance (6, 6).
+    transforms : list of TransformStamped
+    told : list of (float, DiagnosticStatus)
+        When it came, and what.
+    """
+
+    def __init__(self, namespace: str, name: str) -> None:
+        self.node = rclpy.create_node(name, namespace=namespace)
+        self.poses: list[tuple[float, float, np.ndarray, np.ndarray]] = []
+        self.transforms: list[TransformStamped] = []
+        self.told: list[tuple[float, DiagnosticStatus]] = []
+        self.landmarks: LandmarkMap | None = None
+        self.markers: MarkerArray | None = None
+        self.frames: set[str] = set()
+        listen = self.node.create_subscription
+        listen(PoseWithCovarianceStamped, "pose", self._on_pose, 1000)
+        listen(LandmarkMap, "landmarks", lambda message: setattr(self, "landmarks", message), LATCHED)
+        listen(MarkerArray, "markers", lambda message: setattr(self, "markers", message), LATCHED)
+        listen(TFMessage, "/tf", lambda message: self.transforms.extend(message.transforms), 1000)
+        listen(DiagnosticArray, "/diagnostics", self._on_told, 100)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        with suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self._thread.join(5.0)
+        self.node.destroy_node()
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        seen = odometry_from(message, POSE_COVARIANCE)
+        self.frames.add(message.header.frame_id)
+        self.poses.append((time.monotonic(), seen.stamp, seen.pose, np.array(message.pose.covariance).reshape(6, 6)))
+
+    def _on_told(self, message: DiagnosticArray) -> None:
+        self.told += [(time.monotonic(), status) for status in message.status]
+
+    def trajectory(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (t,) and poses (t, 3)."""
+        rows = list(self.poses)
+        return np.array([stamp for _, stamp, _, _ in rows]), np.array([pose for _, _, pose, _ in rows])
+
+    def latest(self, name: str) -> DiagnosticStatus | None:
+        """The last diagnostic whose name ends so."""
+        return next((status for _, status in reversed(self.told) if status.name.endswith(name)), None)
+
+    def said(self, *words: str, since: float = 0.0) -> bool:
+        """Whether a diagnostic that is no OK holds all words."""
+        texts = [s.message for when, s in list(self.told) if when >= since and s.level != DiagnosticStatus.OK]
+        return any(all(word in text for word in words) for text in texts)
+
+    def call(self, kind: Any, name: str, **fields: object) -> Any:
+        """Call a service of the node."""
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(10.0), f"no service {name}"
+        future = client.call_async(kind.Request(**fields))
+        assert wait_for(future.done, 20.0), f"{name} does not answer"
+        return future.result()
+
+
+def wait_for(condition: Callable[[], bool], seconds: float) -> bool:
+    """Wait until something holds; whether it did in time."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def error_of(drive: SimulatedRun, stamps: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """How far off each pose is, m, in a map that begins where the drive has its first scan."""
+    truth = between(drive.truth(np.array([drive.scans[0].stamp]))[0], drive.truth(stamps))
+    return np.hypot(*(poses - truth)[:, :2].T)
