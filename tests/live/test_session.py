@@ -416,6 +416,31 @@ def test_messages_and_transforms_do_not_wait_for_the_mapper(
     assert len(session.poll(0.1)) <= 1
 
 
+def test_the_map_is_drawn_up_while_no_scan_waits_and_only_when_it_is_wanted_and_changed(
+    scan_at: Callable[..., LaserScan], reading_at: Callable[..., Odometry]
+) -> None:
+    fake = Fake()
+    session = fake_session(fake)
+    session.push_odometry(reading_at(20.0), 0.0)
+    assert session.latest_map() is None
+    assert session.due(0.0) == 0.0
+    assert session.poll(0.0) == []
+    first = session.latest_map()
+    assert first is not None
+    assert (first.version, first.corners, first.walls) == (0, "corners", "walls")
+    assert session.due(0.0) is None  # nothing has changed since
+    session.push_scan(scan_at(10.0), 0.1)
+    assert len(session.poll(0.1)) == 1
+    assert session.latest_map() is first  # the pose went first
+    assert session.due(0.1) == 0.0
+    session.poll(0.1)
+    second = session.latest_map()
+    assert second is not None
+    assert second.version == session.map_version == 1
+    session.poll(0.1)
+    assert session.latest_map() is second
+
+
 def test_a_fixed_map_never_changes_its_version(
     scan_at: Callable[..., LaserScan], reading_at: Callable[..., Odometry]
 ) -> None:

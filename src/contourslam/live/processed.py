@@ -1,10 +1,11 @@
-"""What one scan gave in live use."""
+"""What one scan gave in live use, and the map between two."""
 
 from dataclasses import dataclass
 
 from contourslam.contour.contours import Floats
 from contourslam.live.events import Incident
 from contourslam.scan import LaserScan
+from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import ScanUpdate
 
 
@@ -51,3 +52,20 @@ class Processed:
     incidents: tuple[Incident, ...]
     scan: LaserScan
     latency: float
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A map of landmarks as it stood at one moment.
+
+    Attributes
+    ----------
+    version : int
+        That of the session at that moment.
+    corners : CornerMap
+    walls : WallMap
+    """
+
+    version: int
+    corners: CornerMap
+    walls: WallMap

@@ -15,7 +15,7 @@ from contourslam.live.course import Course, Step
 from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
 from contourslam.live.events import Reason, Released, Source, TimeJump
 from contourslam.live.figures import Mapped, Rate
-from contourslam.live.processed import Processed
+from contourslam.live.processed import Drawn, Processed
 from contourslam.live.smoothing import Smoother
 from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
@@ -23,15 +23,15 @@ from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.mapper import Mapper
 
-__all__ = ["Processed", "Session"]
+__all__ = ["Drawn", "Processed", "Session"]
 
 
 class Session:
     """Odometry and scans in any order, poses and a map out; over any mapper.
 
     :meth:`push_odometry` and :meth:`push_scan` only take in and may be called from any thread at any time; :meth:`poll`
-    does the work. The others wait for a :meth:`poll` in another thread to end, but for :meth:`map_to_odom` and
-    :meth:`diagnostics`, which do not wait.
+    does the work. The others wait for a :meth:`poll` in another thread to end, but for :meth:`map_to_odom`,
+    :meth:`latest_map` and :meth:`diagnostics`, which do not wait.
 
     No clock is read: `now` is the caller's, s, and should be one that nobody sets (``time.monotonic``), also where the
     stamps are of simulated time.
@@ -84,6 +84,8 @@ class Session:
         self._mapped = Mapped(config.remember)
         self._step: Step | None = None  # that of the last scan
         self._paused, self._version = False, 0
+        self._wanted = False  # a map is
+        self._drawn: Drawn | None = None
         self._now, self._began = -math.inf, math.nan
         self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
 
@@ -145,14 +147,26 @@ class Session:
                 processed = self._map(item)
                 if processed is not None:
                     done.append(processed)
-            if self._autosave is not None and self._autosave.due(self._version, self._now):
-                self._autosave.hand_over(self._kept, self._version, self._now)
+            if not done:
+                self._use_leisure()
         return done
+
+    def _use_leisure(self) -> None:
+        """Do what would hold up a pose while no scan waits: draw the map up, and save it."""
+        if self._draws():
+            mapper = self._course.mapper
+            self._drawn = Drawn(self._version, mapper.corner_map(), mapper.wall_map())
+            self._wanted = False
+        if self._autosave is not None and self._autosave.due(self._version, self._now):
+            self._autosave.hand_over(self._kept, self._version, self._now)
+
+    def _draws(self) -> bool:
+        return self._wanted and (self._drawn is None or self._drawn.version != self._version)
 
     def due(self, now: float) -> float | None:
         """Give the time until :meth:`poll` has work even if no message comes, s; None where it never will."""
         with self._inbox:
-            return self._synchroniser.due(now)
+            return 0.0 if self._draws() else self._synchroniser.due(now)
 
     def _map(self, item: Released) -> Processed | None:
         if self._jump is not None:
@@ -217,6 +231,15 @@ class Session:
     def map_changed(self, version: int) -> bool:
         """Whether the map may have changed since :attr:`map_version` was `version`."""
         return self._version != version
+
+    def latest_map(self) -> Drawn | None:
+        """Give the map as it was drawn up last, and have it drawn up anew as soon as no scan waits. Never waits itself.
+
+        To draw up a large map takes tens of milliseconds, which :meth:`corner_map` and :meth:`wall_map` take from the
+        next scan's time.
+        """
+        self._wanted = True
+        return self._drawn
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
