@@ -18,6 +18,8 @@ STALE = 0.5  # readings that end this long before the scan (s) say nothing about
 SILENT, MOST_SILENT = 0.5, 10.0  # ... unless that is less than this part of the time between scans far apart (s)
 # Without wheels, standard deviations of the velocity that a robot has beside that of the last step: m/s, m/s, rad/s.
 CRUISE = np.array([0.2, 0.2, 0.5])
+# Wheels that report no motion at all (less than this: m, rad) are dead, not at rest, if the robot moves by so much.
+STILL, MOVES, TURNS = 1e-9, 0.02, math.radians(1.0)
 
 
 class Wheels:
@@ -36,6 +38,7 @@ class Wheels:
         self._usual = SHORTEST  # time between two scans, s
         self._last_step: Floats = np.zeros(3)
         self._last_elapsed = 0.0
+        self._still = self._dead = True  # until they are seen to turn: many a log without wheels has zeros for odometry
 
     def push(self, odometry: Odometry) -> None:
         """Take in one reading."""
@@ -84,6 +87,7 @@ class Wheels:
             In the frame of the base at the scan before.
         """
         self._last_step = step
+        self._dead |= self._still and (math.hypot(step[0], step[1]) > MOVES or abs(step[2]) > TURNS)
 
     def step_or_guess(self, stamp: float, motion: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Motion since the last scan: the wheels', or where they are silent, that of the last step once more.
@@ -98,7 +102,9 @@ class Wheels:
         elapsed, before = stamp - self._stamp, self._last_elapsed
         self._last_elapsed = elapsed
         known = self.step(stamp, motion)
-        if known is not None and motion[0][-1] > -max(STALE, SILENT * min(elapsed, MOST_SILENT)):
+        self._still = known is None or bool((np.abs(known[0]) < STILL).all())
+        self._dead &= self._still
+        if known is not None and not self._dead and motion[0][-1] > -max(STALE, SILENT * min(elapsed, MOST_SILENT)):
             return known
         if not math.isfinite(elapsed):
             return np.zeros(3), np.diag((CRUISE * SHORTEST) ** 2)
