@@ -2,14 +2,12 @@
 
 import math
 
-import numpy as np
-
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
 from contourslam.geometry.poses import between, compose, inverse
 from contourslam.scan import Odometry
 
-SLACK = np.array([0.2, math.radians(20.0)])  # m and rad: what jitter of the stamps may add between two readings
+SLACK, TURN_SLACK = 0.2, math.radians(20.0)  # m and rad: what jitter of the stamps may add between two readings
 LONGEST = 1.0  # s: nobody is believed to have gone on at the greatest speed for longer
 
 
@@ -29,7 +27,7 @@ class ContinuousOdometry:
     """
 
     def __init__(self, config: LiveConfig) -> None:
-        self._most = np.array([config.max_speed, math.radians(config.max_turn_rate_deg)])
+        self._speed, self._turn_rate = config.max_speed, math.radians(config.max_turn_rate_deg)
         self.reset()
 
     def reset(self) -> None:
@@ -78,7 +76,8 @@ class ContinuousOdometry:
     def _leap(self, reading: Odometry) -> float:
         if self._last is None:
             return 0.0
-        step = between(self._last.pose, reading.pose)
-        went = np.array([math.hypot(step[0], step[1]), abs(step[2])])
+        (x0, y0, heading0), (x, y, heading) = self._last.pose.tolist(), reading.pose.tolist()
+        way, turn = math.hypot(x - x0, y - y0), abs(math.remainder(heading - heading0, 2.0 * math.pi))
         elapsed = min(max(reading.stamp - self._last.stamp, 0.0), LONGEST)
-        return float(went.sum()) if (went > self._most * elapsed + SLACK).any() else 0.0
+        leaps = way > self._speed * elapsed + SLACK or turn > self._turn_rate * elapsed + TURN_SLACK
+        return way + turn if leaps else 0.0

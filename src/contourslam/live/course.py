@@ -7,7 +7,7 @@ import numpy as np
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
-from contourslam.geometry.poses import between, compose, inverse
+from contourslam.geometry.poses import between, between_one, compose_one
 from contourslam.live.backing import Backing
 from contourslam.live.continuous import ContinuousOdometry
 from contourslam.live.events import Released, TimeJump
@@ -46,16 +46,16 @@ class Step:
     @property
     def correction(self) -> Floats:
         """The odometry's own frame in the map (``T_map_own``), shape (3,)."""
-        return compose(self.update.pose, inverse(self.T_own_base))
+        return compose_one(np.array(self.update.pose), between_one(self.T_own_base, np.zeros(3)))
 
     @property
     def raw_odometry(self) -> Floats:
         """Odometry at the scan's stamp as it came (``T_odom_base``), shape (3,); zeros where none has ever come."""
-        return self.T_own_base if self.T_own_odom is None else between(self.T_own_odom, self.T_own_base)
+        return self.T_own_base if self.T_own_odom is None else between_one(self.T_own_odom, self.T_own_base)
 
     def to_odom(self, T_map_own: Floats) -> Floats:
         """Give the ``T_map_odom`` that belongs to a correction in the frame without leaps."""
-        return T_map_own if self.T_own_odom is None else compose(T_map_own, self.T_own_odom)
+        return T_map_own if self.T_own_odom is None else compose_one(T_map_own, self.T_own_odom)
 
 
 class Course:
@@ -96,7 +96,7 @@ class Course:
         if blind and self._backing.guesses:
             self._odometry.bridge()  # or else the motion found without it would count twice when it returns
         update = self.mapper.push_scan(item.scan)
-        return Step(update, self.mapper.odometry_pose, self._odometry.T_own_odom, self.localized, blind)
+        return Step(update, np.array(self.mapper.odometry_pose), self._odometry.T_own_odom, self.localized, blind)
 
     @property
     def localized(self) -> bool:

@@ -6,7 +6,9 @@ import numpy as np
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
-from contourslam.geometry.poses import between, compose, inverse
+from contourslam.geometry.poses import between_one, compose_one
+
+ORIGIN = np.zeros(3)
 
 
 class Smoother:
@@ -55,9 +57,9 @@ class Smoother:
         ndarray, shape (3,)
         """
         if self._raw is None:
-            self._smooth, self._time = T_map_odom, time
-        self._raw, self._T_odom_base = T_map_odom, T_odom_base
-        error, _ = self._error(T_map_odom)
+            self._smooth, self._time = np.array(T_map_odom), time
+        self._raw, self._T_odom_base = np.array(T_map_odom), np.array(T_odom_base)
+        _, _, error = self._poses(self._raw)
         if (error > self._large).any():
             self._rates = np.maximum(self._rates, error / self._within)
         self.at(time)
@@ -81,18 +83,18 @@ class Smoother:
             self._advance(self._raw, elapsed)
         return self._smooth
 
-    def _error(self, raw: Floats) -> tuple[Floats, Floats]:
-        """How far the robot's smooth pose is from the raw one, m and rad, and the step there."""
-        smooth = compose(self._smooth, self._T_odom_base)
-        step = between(smooth, compose(raw, self._T_odom_base))
-        return np.array([math.hypot(step[0], step[1]), abs(step[2])]), step
+    def _poses(self, raw: Floats) -> tuple[Floats, Floats, Floats]:
+        """The robot's smooth pose, its raw one, and how far these are apart, m and rad."""
+        smooth, wanted = compose_one(self._smooth, self._T_odom_base), compose_one(raw, self._T_odom_base)
+        turn = abs(math.remainder(wanted[2] - smooth[2], 2.0 * math.pi))
+        return smooth, wanted, np.array([math.hypot(wanted[0] - smooth[0], wanted[1] - smooth[1]), turn])
 
     def _advance(self, raw: Floats, elapsed: float) -> None:
-        error, step = self._error(raw)
+        smooth, wanted, error = self._poses(raw)
         reach = self._rates * elapsed
         if self._usual[0] == 0.0 or (error <= reach).all():
             self._smooth, self._rates = raw, self._usual
             return
         part = float((reach / np.maximum(error, reach)).min())
-        smooth = compose(compose(self._smooth, self._T_odom_base), part * step)
-        self._smooth = compose(smooth, inverse(self._T_odom_base))
+        pose = compose_one(smooth, part * between_one(smooth, wanted))
+        self._smooth = compose_one(pose, between_one(self._T_odom_base, ORIGIN))
