@@ -1,6 +1,7 @@
 """The beginning of every real log at hand, through every detector: nothing fails, and the answer is a sane one."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -97,6 +98,17 @@ def test_the_graph_keeps_within_centimetres_of_the_known_relative_poses(log: str
     assert judged.online is not None
     assert judged.estimate.translation_summary.mean <= judged.online.translation_summary.mean
     assert len(result.loops) > 20
+
+
+def test_a_log_with_zeros_for_odometry_is_mapped_from_its_scans() -> None:
+    pytest.importorskip("gtsam", reason="needs the extra 'graph'")
+    stamps, poses = read_relations(path_of(KNOWN["mit_csail"][0]))
+    messages = (
+        replace(message, pose=np.zeros(3)) if isinstance(message, Odometry) else message
+        for message in open_recording(path_of(LOGS["mit_csail"])).messages()
+    )
+    judged = judge(replay(messages, Config(back_end="graph")), stamps, poses)
+    assert judged.estimate.translation_summary.mean < 0.10
 
 
 def distance(poses: Floats, reference: Floats) -> float:
