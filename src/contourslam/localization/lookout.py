@@ -24,9 +24,10 @@ EAGER = 6  # looks that are taken in quick succession; later ones keep apart by 
 SOON, LATER = 0.25, 1.0  # s between the first looks, and between later ones
 LIKELY = 0.7  # probability by which one of two looks is sure enough; a single one had to be surer
 MOST_LOOKS = 8  # that are remembered
-# Looks none of which is sure must be so many, along so much of way (m), each of them seeing no second place that comes
-# nearer to the first than by this factor.
-STEADY_LOOKS, STEADY_WAY, CLEAR = 4, 1.0, 0.5
+# Looks none of which is sure must be so many, along so much of way (m) ...
+STEADY_LOOKS, STEADY_WAY = 5, 2.0
+# ... and none may find it less probable than this that the robot is there, or see a second place half as probable.
+DOUBTED, CLEAR = 0.01, 0.5
 STILL = np.zeros(3), 1e-10 * np.eye(3)
 
 
@@ -67,7 +68,7 @@ class Lookout:
     def __init__(self, finder: Finder, max_range: float, lidar: Floats) -> None:
         self._finder, self._max_range, self._lidar = finder, max_range, lidar
         self.scans = 0
-        self._looks = 0
+        self.looks = 0
         self._next_look = 0.0
         self._begin()
 
@@ -99,7 +100,7 @@ class Lookout:
         if before and step.aligned and step.quality < BROKEN:
             self._begin()
             step = step_by_contours(self._odometry, oriented, *STILL)
-            self._looks, self._next_look = 0, 0.0
+            self.looks, self._next_look = 0, 0.0
         first = self._odometry.keyframes == 1 and not self._kept
         self.scans += 1
         self._next_look -= max(elapsed, 0.0)
@@ -118,13 +119,14 @@ class Lookout:
         """
         if self._next_look > 0.0:
             return None
-        self._looks += 1
-        self._next_look = SOON if self._looks <= EAGER else LATER
+        self.looks += 1
+        self._next_look = SOON if self.looks <= EAGER else LATER
         found = self._finder.find(self.view())
         if not np.isfinite(found.pose).all():
             self._seen.clear()
             return None
-        clear = not found.runners_up or found.runners_up[0].probability < CLEAR * found.probability
+        rival = found.runners_up[0].probability if found.runners_up else 0.0
+        clear = found.probability > DOUBTED and rival < CLEAR * found.probability
         look = _Look(self.pose, found.pose, found.confident or (clear and found.probability > LIKELY), clear)
         agreeing = [other for other in self._seen if other.agrees(look)]
         sure = look.sure and any(other.sure for other in agreeing)
