@@ -1,6 +1,6 @@
 """A map that was kept goes on where it ended: one frame, the same landmarks, as true as an uncut drive."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -19,6 +19,7 @@ pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
 from contourslam.graph import GraphSlam, kept, resume
+from contourslam.graph.start import find_start
 from contourslam.simulation.long_drive import building_drive
 
 Floats = NDArray[np.float64]
@@ -233,7 +234,7 @@ def test_a_map_of_nothing_is_kept_and_cannot_be_continued(tmp_path: Path) -> Non
 @pytest.mark.parametrize("lacking", ["keyframes", "relations", "seen", "stretches"])
 def test_a_map_that_lacks_what_is_needed_says_so(lacking: str) -> None:
     saved = replace(first_map(), **{lacking: None})  # type: ignore[arg-type] # all four may be None
-    with pytest.raises(MapError, match="cannot be continued: it holds no keyframes, or .*; map anew"):
+    with pytest.raises(MapError, match=r"cannot be continued: it holds no keyframes, or .*; map anew"):
         go_on(saved, np.zeros(3))
 
 
@@ -255,3 +256,42 @@ def test_old_places_are_as_unsure_as_they_were() -> None:
         ).tolist()
     assert 0.8 < np.median(ratios) < 1.5
     assert np.quantile(ratios, 0.05) > 0.5
+
+
+@pytest.mark.parametrize("guess", [None, (0.4, -0.3, 0.15)], ids=["anywhere", "about_here"])
+@pytest.mark.parametrize("where", [0.1, 0.5])
+def test_the_start_of_a_further_drive_is_found_by_its_first_scans(
+    where: float, guess: tuple[float, float, float] | None
+) -> None:
+    poses, saved = first_half()
+    first = int(where * len(poses))
+    scans = 0
+
+    def messages() -> Iterator[LaserScan | Odometry]:
+        nonlocal scans
+        for message in part(first, min(first + 150, len(poses))):
+            scans += isinstance(message, LaserScan)
+            if not isinstance(message, TruePose):
+                yield message
+
+    about = None if guess is None else compose(poses[first], np.array(guess))
+    found = find_start(saved, CONFIG, messages(), guess=about, lidar_mount=np.array(MOUNT))
+    assert found is not None
+    pose, covariance = found
+    off = between(poses[first], pose)
+    assert np.hypot(off[0], off[1]) < 0.03
+    assert abs(off[2]) < 0.01
+    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-9)
+    assert np.linalg.eigvalsh(covariance).min() > 0.0
+    assert np.sqrt(np.diag(covariance)).max() < 0.2
+    assert scans < 120  # no more of the drive is read than it takes
+
+
+@pytest.mark.parametrize("building", [1, 5])
+def test_a_building_that_begins_like_this_one_is_told_apart(building: int) -> None:
+    elsewhere = [m for m in building_drive(20.0, building).messages() if not isinstance(m, TruePose)]
+    assert find_start(first_map(), CONFIG, elsewhere, lidar_mount=np.array(MOUNT)) is None
+
+
+def test_nothing_shows_no_start() -> None:
+    assert find_start(first_map(), CONFIG, [], lidar_mount=np.array(MOUNT)) is None

@@ -1,5 +1,6 @@
 """Where a further drive begins in a map that was kept."""
 
+import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -14,6 +15,9 @@ from contourslam.matching.small import moved, turned
 from contourslam.scan import LaserScan, Odometry
 
 SURE = 5  # scans in a row that find the robot where it is followed to
+# A drive that goes on at a wrong place spoils the map, and one corridor looks like another: the robot is followed this
+# far (m) from where it was found, or through so many scans where it stands, or to the end.
+WAY, SCANS = 10.0, 150
 
 
 def find_start(
@@ -51,7 +55,8 @@ def find_start(
     """
     localizer = Localizer(saved, config, initial_pose=guess, lidar_mount=lidar_mount)
     drive = GraphSlam(config, localizer.detector, lidar_mount=lidar_mount)
-    sure = 0
+    start: tuple[Floats, Floats] | None = None
+    sure, way, last = 0, 0.0, np.zeros(3)
     for message in messages:
         if isinstance(message, Odometry):
             localizer.push_odometry(message)
@@ -59,9 +64,15 @@ def find_start(
             continue
         here, beside = localizer.push_scan(message), drive.push_scan(message)
         on_scan()
-        sure = sure + 1 if localizer.localized else 0
+        if not localizer.localized:
+            start, sure, way = None, 0, 0.0
+            continue
+        sure, way, last = sure + 1, way + math.dist(beside.pose[:2], last[:2]), beside.pose
         if sure == SURE:
             back = between_one(beside.pose, np.zeros(3))
             noise = turned(beside.covariance, -beside.pose[2])
-            return compose_one(here.pose, back), moved(here.pose, here.covariance, back, noise)[1]
-    return None
+            start = compose_one(here.pose, back), moved(here.pose, here.covariance, back, noise)[1]
+            way = 0.0
+        if sure == SCANS or (sure > SURE and way > WAY):
+            break
+    return start
