@@ -6,7 +6,7 @@ from collections import OrderedDict
 import numpy as np
 
 from contourslam.contour.contours import Floats
-from contourslam.errors import ContourslamError
+from contourslam.errors import ContourslamError, MapError
 from contourslam.localization.free_space import CELL, FreeSpace, see_free
 from contourslam.localization.global_search import Standing, standing_on
 from contourslam.maps.saved_map import Contoured, SavedMap
@@ -43,8 +43,10 @@ class KnownMap:
 
     Raises
     ------
+    MapError
+        If the map holds nothing.
     ContourslamError
-        If the map holds nothing, or spreads over more than the search can hold.
+        If it spreads over more than the search can hold.
     """
 
     def __init__(self, saved: SavedMap) -> None:
@@ -59,7 +61,7 @@ class KnownMap:
         else:
             self.points = _merged(_drawn(self.landmarks))
         if not len(self.points):
-            raise ContourslamError("the map holds no contours, corners or walls: there is nothing to localise in")
+            raise MapError("the map holds no contours, corners or walls: there is nothing to localise in")
         low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
         if frames is not None and len(frames):
             low, high = (

@@ -7,7 +7,7 @@ import numpy as np
 from contourslam.contour.contours import Floats, Ints
 
 SQUARE = 0.2  # m; points in one square count for one look at a surface
-MOST_SEARCHED = 120  # points that the global search takes
+MOST_SEARCHED = 80  # points that the global search takes
 FARTHEST = 15.0  # m; points beyond are not searched with where there are others: they ask for the finest headings
 
 

@@ -36,6 +36,7 @@ WIDEST_STEP = 0.02  # rad; a heading step for points that all lie near the scan'
 NEAR, NEAR_ANGLE = 0.3, math.radians(5.0)  # m, rad: closer poses are one hypothesis
 ID_BITS, SCORE_BITS = 40, 22
 ANYWHERE: Flags = np.empty((0, 0), np.bool_)
+CERTAIN: Floats = np.ones(TOP + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +186,7 @@ def branch_and_bound(
     step: float,
     counts: tuple[int, int, int],
     standing: tuple[Flags, Flags, Flags, Flags, Flags],
+    hopes: Floats,
     bound: Sums,
     least: int,
     rival: float,
@@ -217,9 +219,11 @@ def branch_and_bound(
                 for x in range(x0, min(x0 + width, (nx + BLOCK - 1) // BLOCK)):
                     score = int(bound[y * width + x - x0])
                     if score >= least and _stands(standing[TOP], y * BLOCK, x * BLOCK):
-                        place = ((TOP * nt + t) * ny + y * BLOCK) * nx + x * BLOCK
-                        heap = _push(heap, size, (((score << 1) | 1) << ID_BITS) | (mask - place))
-                        size += 1
+                        likely = int(score * hopes[TOP])
+                        if likely >= least:
+                            place = ((TOP * nt + t) * ny + y * BLOCK) * nx + x * BLOCK
+                            heap = _push(heap, size, (((likely << 1) | 1) << ID_BITS) | (mask - place))
+                            size += 1
     while size > 0:
         if count == found.shape[0] or budget == 0:
             return count, heap[0] >> (ID_BITS + 1)
@@ -249,9 +253,10 @@ def branch_and_bound(
             _score(fields[level], entries, own, x >> shift, y >> shift, half >> shift, least, scores)
             for c in range(4):
                 cx, cy = x + (c & 1) * half, y + (c >> 1) * half
-                if scores[c] >= least and cx < nx and cy < ny and _stands(standing[level], cy, cx):
+                likely = int(scores[c] * hopes[level])
+                if likely >= least and cx < nx and cy < ny and _stands(standing[level], cy, cx):
                     place = ((level * nt + s) * ny + cy) * nx + cx
-                    heap = _push(heap, size, (((scores[c] << 1) | (level > 0)) << ID_BITS) | (mask - place))
+                    heap = _push(heap, size, (((likely << 1) | (level > 0)) << ID_BITS) | (mask - place))
                     size += 1
     return count, 0
 
@@ -338,6 +343,7 @@ def search(
         step,
         counts,
         (ANYWHERE,) * 5,
+        CERTAIN,
         np.empty(rows * width, np.uint32),
         max(math.ceil(min_score * 255 * len(points)), 1),
         rival,

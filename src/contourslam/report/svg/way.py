@@ -101,6 +101,11 @@ def _axes(result: RunResult) -> Axes:
     points = np.concatenate(
         [result.poses[:, :2], result.wall_map.end_points.reshape(-1, 2), result.corner_map.positions]
     )
+    return axes_around(points)
+
+
+def axes_around(points: Floats) -> Axes:
+    """Axes of one scale that hold all points, shape (n, 2), m."""
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.03 * float((high - low).max()) + 0.05
     span = high - low + 2.0 * margin
