@@ -287,7 +287,7 @@ def test_the_start_of_a_further_drive_is_found_by_its_first_scans(
     assert scans < 120  # no more of the drive is read than it takes
 
 
-@pytest.mark.parametrize("building", [1, 5])
+@pytest.mark.parametrize("building", [1, 6])
 def test_a_building_that_begins_like_this_one_is_told_apart(building: int) -> None:
     elsewhere = [m for m in building_drive(20.0, building).messages() if not isinstance(m, TruePose)]
     assert find_start(first_map(), CONFIG, elsewhere, lidar_mount=np.array(MOUNT)) is None
