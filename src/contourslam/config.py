@@ -198,6 +198,10 @@ class LiveConfig:
     """... where it is larger than this, m ..."""
     large_correction_deg: float = 30.0
     """... or turns by more than this, degrees."""
+    sure_way: float = 10.0
+    """A map is continued once the robot has been followed in it for this way, m: one corridor looks like another ..."""
+    sure_time: float = 15.0
+    """... or for this time, s."""
     give_up_after: float = 20.0
     """A robot that is not found again in its own map within this time, s, begins a new one."""
     autosave_period: float = 60.0
@@ -213,7 +217,7 @@ class LiveConfig:
         _check_positive(
             self, "wait", "max_waiting", "silent_after", "jump_back", "max_speed", "max_turn_rate_deg",
             "smooth_turn_rate_deg", "smooth_within", "large_correction", "large_correction_deg", "late_after",
-            "give_up_after", "remember",
+            "sure_way", "sure_time", "give_up_after", "remember",
         )  # fmt: skip
         for name in ("odometry_slack", "smooth_speed", "autosave_period", "poor_quality"):
             value = getattr(self, name)

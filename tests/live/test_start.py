@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Streams = Callable[..., Any]
 GRAPH = Config(back_end="graph", lidar=LidarConfig(sigma_range=0.005))
 EKF = Config(slam=SlamConfig(walls=True, contour_matching=True), lidar=LidarConfig(sigma_range=0.005))
-LIVE = LiveConfig()
+LIVE = LiveConfig(sure_way=1.0, sure_time=10.0)
 
 
 def run(session: Session, messages: list[tuple[float, Any]]) -> list[Processed]:
@@ -65,7 +65,7 @@ def test_a_map_is_continued_from_anywhere_in_it_and_its_landmarks_keep_their_ids
     stream: Streams, mapped: Path, tmp_path: Path
 ) -> None:
     before = load_map(mapped)
-    drive = later(stream, 6.0, skip=4.0)
+    drive = later(stream, 8.0, skip=4.0)
     session = mapping(GRAPH, LIVE, map_file=mapped)
     assert set(session.wall_map().ids.tolist()) == set(before.walls.ids.tolist())
     done = run(session, drive.messages)

@@ -71,15 +71,14 @@ def mapping(
         known = keep(mapper)
         if config.back_end != "graph" or known.keyframes is None or not len(known.keyframes):
             return begin(initial_pose if pose is None else pose)
-        wait = live.give_up_after
-        return Resuming(known, config, initial_pose=pose, lidar_mount=lidar_mount, give_up_after=wait, begin=begin)
+        return Resuming(known, config, live, initial_pose=pose, lidar_mount=lidar_mount, begin=begin)
 
     def go_on(saved: SavedMap, pose: Floats | None = None) -> Mapper:
         if config.back_end != "graph":
             raise ConfigError(f"a map is continued by the graph, not by {config.back_end}; choose --back-end graph")
         if saved.relations is None:
             raise MapError("this map cannot be continued, it holds landmarks alone; localise in it, or map anew")
-        return Resuming(saved, config, initial_pose=pose, lidar_mount=lidar_mount)
+        return Resuming(saved, config, live, initial_pose=pose, lidar_mount=lidar_mount)
 
     first = None
     if map_file is not None:
