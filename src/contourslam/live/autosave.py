@@ -7,6 +7,8 @@ from pathlib import Path
 
 from contourslam.maps.saved_map import SavedMap
 
+RESTS = 200  # times as long as it takes to make a map, no other is made
+
 
 class Autosave:
     """Writes a map every so often while it changes, in a thread of its own; changed in place.
@@ -56,6 +58,10 @@ class Autosave:
             return
         self._at, self._handed = now, version
         self._writing = self._thread.submit(self._write, self.path, saved)
+
+    def took(self, seconds: float, now: float) -> None:
+        """Say how long the work was held up to make the map: the larger it is, the rarer it is saved."""
+        self._next = max(self._next, now + RESTS * seconds)
 
     def set_aside(self, keep: Callable[[], SavedMap]) -> None:
         """Write the map beside the file, as ``previous-NAME``, before it is left for another."""

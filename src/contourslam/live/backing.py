@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contourslam.contour.contours import Floats
+from contourslam.live.outlines import Outlines, outlines
 from contourslam.maps.saved_map import SavedMap
 from contourslam.slam.mapper import Mapper
 
@@ -34,6 +35,8 @@ class Backing:
         Make a mapper that continues a saved map, or localises in it.
     write, read : callable or None
         Write a map to a file, atomically, and read it: :func:`contourslam.maps.file.save_map` and ``load_map``.
+    outlines : callable
+        Given a mapper and the version of its map, the contours of its keyframes.
     fixed : bool
         The map never changes: localisation.
     guesses : bool
@@ -48,5 +51,6 @@ class Backing:
     open: Callable[[SavedMap], Mapper] | None = None
     write: Callable[[Path, SavedMap], None] | None = None
     read: Callable[[Path], SavedMap] | None = None
+    outlines: Callable[[Mapper, int], Outlines] = outlines
     fixed: bool = False
     guesses: bool = True

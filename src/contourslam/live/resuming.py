@@ -126,6 +126,11 @@ class Resuming:
         """Revise the whole drive, where the mapper can."""
         return self._mapper.finish()
 
+    @property
+    def standing(self) -> tuple[Mapper, SavedMap | None]:
+        """The mapper that works now, and the map in which it localises, or None where it maps."""
+        return self._mapper, None if self.growing else self._saved
+
     def keep(self, about: Mapping[str, str]) -> SavedMap:
         """Give the map as it is kept."""
         return keep_map(self._mapper, about) if self.growing else self._saved

@@ -15,6 +15,7 @@ from contourslam.live.course import Course, Step
 from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
 from contourslam.live.events import Reason, Released, Source, TimeJump
 from contourslam.live.figures import Mapped, Rate
+from contourslam.live.outlines import Outlines
 from contourslam.live.processed import Drawn, Processed
 from contourslam.live.smoothing import Smoother
 from contourslam.live.synchroniser import Synchroniser
@@ -86,6 +87,8 @@ class Session:
         self._paused, self._version = False, 0
         self._wanted = False  # a map is
         self._drawn: Drawn | None = None
+        self._outlines_wanted = False
+        self._outlines: Outlines | None = None
         self._now, self._began = -math.inf, math.nan
         self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
 
@@ -157,8 +160,13 @@ class Session:
             mapper = self._course.mapper
             self._drawn = Drawn(self._version, mapper.corner_map(), mapper.wall_map())
             self._wanted = False
+        if self._outlines_wanted:
+            self._outlines_wanted = False
+            self._outlines = self._backing.outlines(self._course.mapper, self._version)
         if self._autosave is not None and self._autosave.due(self._version, self._now):
             self._autosave.hand_over(self._kept, self._version, self._now)
+            if self._clock is not None:
+                self._autosave.took(self._clock() - self._now, self._now)
 
     def _draws(self) -> bool:
         return self._wanted and (self._drawn is None or self._drawn.version != self._version)
@@ -166,7 +174,7 @@ class Session:
     def due(self, now: float) -> float | None:
         """Give the time until :meth:`poll` has work even if no message comes, s; None where it never will."""
         with self._inbox:
-            return 0.0 if self._draws() else self._synchroniser.due(now)
+            return 0.0 if self._draws() or self._outlines_wanted else self._synchroniser.due(now)
 
     def _map(self, item: Released) -> Processed | None:
         if self._jump is not None:
@@ -240,6 +248,12 @@ class Session:
         """
         self._wanted = True
         return self._drawn
+
+    def latest_outlines(self) -> Outlines | None:
+        """Give the keyframes' contours as they were drawn up last, and have them drawn up anew. Never waits itself."""
+        if self._outlines is None or self._outlines.version != self._version:
+            self._outlines_wanted = True
+        return self._outlines
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""

@@ -10,6 +10,7 @@ from contourslam.contour.contours import Floats
 from contourslam.errors import ConfigError, MapError
 from contourslam.live.backing import Backing
 from contourslam.live.events import Source
+from contourslam.live.outlines import outlines
 from contourslam.live.resuming import Resuming
 from contourslam.live.session import Session
 from contourslam.localization.follow import Localizer
@@ -147,7 +148,7 @@ def localization(
 
     backing = Backing(
         begin=begin, lost=lost, localized=localized, keep=lambda mapper: current, open=open_map, write=save_map,
-        read=load_map, fixed=True,
+        read=load_map, outlines=lambda mapper, version: outlines(mapper, version, current), fixed=True,
     )  # fmt: skip
     return Session(
         backing, live, odometry_lag=config.slam.odometry_lag, clock=clock, topics=topics,
