@@ -9,12 +9,12 @@ from pathlib import Path
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
 from contourslam.errors import ContourslamError
-from contourslam.live.autosave import Autosave
 from contourslam.live.backing import Backing
 from contourslam.live.course import Course, Step
 from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
 from contourslam.live.events import Reason, Released, Source, TimeJump
 from contourslam.live.figures import Mapped, Rate
+from contourslam.live.leisure import Leisure
 from contourslam.live.outlines import Outlines
 from contourslam.live.processed import Drawn, Processed
 from contourslam.live.smoothing import Smoother
@@ -74,9 +74,7 @@ class Session:
         self._work = threading.RLock()  # held while the mapper works
         self._course = Course(backing, config, odometry_lag)
         self._jump: TimeJump | None = None  # of which it is not yet known what it was
-        self._autosave: Autosave | None = None
-        if autosave is not None and backing.keep and backing.write and not backing.fixed and config.autosave_period > 0:
-            self._autosave = Autosave(autosave, config.autosave_period, backing.write)
+        self._leisure = Leisure(backing, config, autosave, clock)
         self._inbox = threading.Lock()  # held for moments; all below is changed under it
         waits = config if expects_odometry else replace(config, wait=math.ulp(0.0))
         self._synchroniser = Synchroniser(waits, odometry_lag=odometry_lag)
@@ -85,10 +83,6 @@ class Session:
         self._mapped = Mapped(config.remember)
         self._step: Step | None = None  # that of the last scan
         self._paused, self._version = False, 0
-        self._wanted = False  # a map is
-        self._drawn: Drawn | None = None
-        self._outlines_wanted = False
-        self._outlines: Outlines | None = None
         self._now, self._began = -math.inf, math.nan
         self._notes: dict[str, tuple[float, str]] = {}  # what happened last, and when
 
@@ -151,30 +145,13 @@ class Session:
                 if processed is not None:
                     done.append(processed)
             if not done:
-                self._use_leisure()
+                self._leisure.use(self._course.mapper, self._kept, self._version, self._now)
         return done
-
-    def _use_leisure(self) -> None:
-        """Do what would hold up a pose while no scan waits: draw the map up, and save it."""
-        if self._draws():
-            mapper = self._course.mapper
-            self._drawn = Drawn(self._version, mapper.corner_map(), mapper.wall_map())
-            self._wanted = False
-        if self._outlines_wanted:
-            self._outlines_wanted = False
-            self._outlines = self._backing.outlines(self._course.mapper, self._version)
-        if self._autosave is not None and self._autosave.due(self._version, self._now):
-            self._autosave.hand_over(self._kept, self._version, self._now)
-            if self._clock is not None:
-                self._autosave.took(self._clock() - self._now, self._now)
-
-    def _draws(self) -> bool:
-        return self._wanted and (self._drawn is None or self._drawn.version != self._version)
 
     def due(self, now: float) -> float | None:
         """Give the time until :meth:`poll` has work even if no message comes, s; None where it never will."""
         with self._inbox:
-            return 0.0 if self._draws() or self._outlines_wanted else self._synchroniser.due(now)
+            return 0.0 if self._leisure.waited_for(self._version) else self._synchroniser.due(now)
 
     def _map(self, item: Released) -> Processed | None:
         if self._jump is not None:
@@ -246,14 +223,13 @@ class Session:
         To draw up a large map takes tens of milliseconds, which :meth:`corner_map` and :meth:`wall_map` take from the
         next scan's time.
         """
-        self._wanted = True
-        return self._drawn
+        self._leisure.want_map()
+        return self._leisure.drawn
 
     def latest_outlines(self) -> Outlines | None:
         """Give the keyframes' contours as they were drawn up last, and have them drawn up anew. Never waits itself."""
-        if self._outlines is None or self._outlines.version != self._version:
-            self._outlines_wanted = True
-        return self._outlines
+        self._leisure.want_outlines()
+        return self._leisure.outlines
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""
@@ -291,7 +267,7 @@ class Session:
     def reset(self) -> None:
         """Begin anew; where there is an autosave, the map until now is first saved beside it as ``previous-NAME``."""
         with self._work:
-            self._set_aside()
+            self._leisure.set_aside(self._kept, self._version)
             self._swap(self._backing.begin())
 
     def lost(self, pose: Floats | None = None) -> None:
@@ -334,27 +310,21 @@ class Session:
         saved = self._backing.read(path)
         with self._work:
             mapper = self._backing.open(saved)
-            self._set_aside()
+            self._leisure.set_aside(self._kept, self._version)
             self._swap(mapper)
 
     def close(self) -> None:
         """Save what has not been saved by itself yet, where there is a place for it, and end."""
         with self._work:
-            if self._autosave is not None:
-                self._autosave.close(self._kept, self._version, self._now)
+            self._leisure.close(self._kept, self._version, self._now)
 
     def _kept(self) -> SavedMap:
         if self._backing.keep is None:
             raise ContourslamError("the map of this session cannot be saved")
         return self._backing.keep(self._course.mapper)
 
-    def _set_aside(self) -> None:
-        """Save the map that is about to be left; whatever is wrong with that must not keep from going on."""
-        if self._autosave is not None and self._version > 0:
-            self._autosave.set_aside(self._kept)
-
     def _go_on_as_lost(self, pose: Floats | None, jump: TimeJump | None = None) -> None:
-        self._set_aside()
+        self._leisure.set_aside(self._kept, self._version)
         self._swap(self._backing.lost(self._course.mapper, pose), jump)
 
     def _swap(self, mapper: Mapper, jump: TimeJump | None = None) -> None:
@@ -372,7 +342,6 @@ class Session:
             self._tick(now)
             then = self._now - self._config.remember
             notes = {what: text for what, (when, text) in self._notes.items() if when >= then}
-            saving = self._autosave
             condition = Condition(
                 scans=self._sensor("scan", True),
                 odometry=self._sensor("odometry", self._expects_odometry),
@@ -384,9 +353,9 @@ class Session:
                 jump=notes.get("jump", ""),
                 leap=notes.get("leap", ""),
                 map_version=self._version,
-                saved=math.nan if saving is None else self._now - saving.saved_at,
-                autosave="" if saving is None else str(saving.path),
-                trouble="" if saving is None else saving.trouble,
+                saved=self._now - self._leisure.saved_at,
+                autosave=self._leisure.saving_to,
+                trouble=self._leisure.trouble,
             )
         return diagnose(condition, self._config)
 
