@@ -20,6 +20,7 @@ COMMANDS = {
     "grid": "Render the occupancy grid of a mapped recording.",
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare the landmark detectors and write the report.",
+    "localize": "Follow a robot through a recording in a known map.",
     "locate": "Find a robot in a known map from one scan.",
     "world": "Write a simulated room as a world of Gazebo.",
     "warm-up": "Compile everything before the robot drives.",

@@ -13,11 +13,12 @@ def lead(values: RunValues) -> str:
     result, metrics = values.result, values.metrics
     time = float(result.stamps.max() - result.stamps.min())
     size = metrics["landmarks"]
-    said = (
-        f"{count(len(result.stamps), 'scan')} over {length(distance(result))} and {clock(time)} min became "
-        f"{count(size['corners'], 'corner')} and {count(size['walls'], 'wall')}, "
-        f"by the {BACK_ENDS.get(result.back_end, result.back_end)} back end"
-    )
+    said = f"{count(len(result.stamps), 'scan')} over {length(distance(result))} and {clock(time)} min "
+    landmarks = f"{count(size['corners'], 'corner')} and {count(size['walls'], 'wall')}"
+    if result.back_end == "localization":
+        said += f"were followed in a map of {landmarks}"
+    else:
+        said += f"became {landmarks}, by the {BACK_ENDS.get(result.back_end, result.back_end)} back end"
     reason = metrics.get("back_end_reason")
     said += f" ({reason})" if reason else ""
     said += f"; {count(len(result.loops), 'loop')} closed" if result.loops else ""
