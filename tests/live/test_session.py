@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from contourslam.live.events import Reason
 from contourslam.live.session import Processed, Session
 from contourslam.live.start import mapping
 from contourslam.maps.saved_map import SavedMap
+from contourslam.recordings import open_recording
 from contourslam.replay import make_mapper, replay
-from contourslam.scan import LaserScan, Odometry
+from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.slam.mapper import Mapper
 from contourslam.slam.result import ScanUpdate
 
@@ -31,6 +33,7 @@ Streams = Callable[..., Any]
 EKF = Config(slam=SlamConfig(walls=True, contour_matching=True), lidar=LidarConfig(sigma_range=0.005))
 GRAPH = replace(EKF, back_end="graph")
 LIVE = LiveConfig()
+LOG = Path(__file__).parents[3] / "shared" / "data" / "acapulco" / "acapulco.log.xz"
 
 
 @dataclass
@@ -117,6 +120,24 @@ def test_live_equals_replay_to_the_bit(stream: Streams, config: Config) -> None:
     if config is EKF:
         np.testing.assert_array_equal([p.covariance for p in told.done], result.covariances)
         np.testing.assert_array_equal(session.corner_map().positions, result.corner_map.positions)
+
+
+@pytest.mark.skipif(not LOG.exists(), reason=f"{LOG.name} is not there")
+def test_live_equals_replay_on_a_real_log() -> None:
+    recording = open_recording(LOG)
+    messages = [m for m in islice(recording.messages(), 2500) if not isinstance(m, TruePose)]
+    session = mapping(GRAPH, LIVE)
+    done = []
+    for message in messages:
+        if isinstance(message, LaserScan):
+            session.push_scan(message, message.stamp)
+        else:
+            session.push_odometry(message, message.stamp)
+        done += session.poll(message.stamp)
+    poses = replay(messages, GRAPH).online_poses
+    assert poses is not None and len(poses) > 50
+    np.testing.assert_array_equal([p.T_map_base for p in done], poses)
+    assert session.diagnostics(messages[-1].stamp)[0].level is Level.OK
 
 
 @pytest.mark.parametrize("config", [EKF, GRAPH], ids=["ekf", "graph"])
@@ -240,6 +261,8 @@ def test_a_base_driver_started_again_in_mid_drive_is_no_motion(stream: Streams) 
     told = run(new(drive), moved)
     assert told.errors(drive.truth)[1].max() < 0.03
     assert "the odometry leapt by" in told.at(5.0, "odometry").message
+    way = np.diff([compose(p.T_map_odom_smooth, p.T_odom_base) for p in told.done], axis=0)
+    assert np.hypot(way[:, 0], way[:, 1]).max() < 0.08  # of which the drive itself is 0.045
     for p in told.done:
         np.testing.assert_allclose(compose(p.T_map_odom, p.T_odom_base), p.T_map_base, atol=1e-9)
     raw = {m.stamp: m.pose for _, m in moved if isinstance(m, Odometry)}
