@@ -1,10 +1,14 @@
 """A ROS graph of the tests' own, a simulated drive, and the processes that a test starts."""
 
+import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -53,55 +57,59 @@ def recording(drive: SimulatedRun, tmp_path_factory: pytest.TempPathFactory) -> 
     return path
 
 
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Start nodes as processes; they are ended with the test, and what they said is shown where it fails."""
-    running: list[subprocess.Popen[str]] = []
+class Processes:
+    """Nodes and players of one test, each in a process of its own."""
 
-    def begin(
-        node: str, *, namespace: str = "", remap: dict[str, str] | None = None, **parameters: object
-    ) -> subprocess.Popen[str]:
+    def __init__(self, recording: Path, folder: Path) -> None:
+        self._recording, self._folder = recording, folder
+        self._running: list[subprocess.Popen[str]] = []
+
+    def start(self, node: str, *, namespace: str = "", **parameters: object) -> "subprocess.Popen[str]":
+        """Start a node; ``__`` in a parameter's name stands for a dot."""
         words = [sys.executable, "-m", f"contourslam_ros.{node}", "--ros-args"]
         words += ["-r", f"__ns:=/{namespace}"] if namespace else []
-        for name, topic in (remap or {}).items():
-            words += ["-r", f"{name}:={topic}"]
         for name, value in parameters.items():
-            shown = str(value).lower() if isinstance(value, bool) else value
-            words += ["-p", f"{name.replace('__', '.')}:={shown}"]
-        running.append(subprocess.Popen(words, stdout=sys.stderr, stderr=sys.stderr, text=True))
-        return running[-1]
+            words += ["-p", f"{name.replace('__', '.')}:={str(value).lower() if isinstance(value, bool) else value}"]
+        return self._run(words)
 
-    yield begin
-    for process in running:
-        process.terminate()
-    for process in running:
-        try:
-            process.wait(20.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+    def play(self, **choices: Any) -> "subprocess.Popen[str]":
+        """Play the recording as a :class:`Plan` says."""
+        path = self._folder / f"robot_{choices.get('namespace', '')}.plan"
+        plan = Plan(recording=str(self._recording), report=str(path.with_suffix(".report")), **choices)
+        path.write_text(json.dumps(asdict(plan)))
+        return self._run([sys.executable, str(HERE / "player.py"), str(path)])
 
+    def played(self, namespace: str = "") -> dict[str, float]:
+        """Give what was added to the recording's stamps (`shift`, s), and how many `scans` were sent."""
+        report: dict[str, float] = json.loads((self._folder / f"robot_{namespace}.report").read_text())
+        return report
 
-@pytest.fixture
-def play(recording: Path, tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Play the recording, in a process of its own."""
-    running: list[subprocess.Popen[str]] = []
+    def _run(self, words: list[str]) -> "subprocess.Popen[str]":
+        self._running.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, text=True))
+        return self._running[-1]
 
-    def begin(**choices: object) -> subprocess.Popen[str]:
-        plan = Plan(str(recording), **choices)  # type: ignore[arg-type]  # as the caller knows
-        path = plan.write(tmp_path / f"plan{len(running)}.json")
-        running.append(subprocess.Popen([sys.executable, str(HERE / "player.py"), str(path)], text=True))
-        return running[-1]
-
-    yield begin
-    for process in running:
-        process.kill()
-        process.wait()
+    def end(self) -> None:
+        """End what still runs, as a launch system does."""
+        for process in self._running:
+            process.send_signal(signal.SIGINT)
+        for process in self._running:
+            try:
+                process.wait(30.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
-@pytest.fixture
-def observe(ros: None) -> Iterator[Callable[..., Observer]]:
-    """Listen to what a node publishes."""
+@pytest.fixture(scope="module")
+def processes(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    made = Processes(recording, tmp_path_factory.mktemp("processes"))
+    yield made
+    made.end()
+
+
+@pytest.fixture(scope="module")
+def observe(ros: None) -> Iterator[Callable[[str], Observer]]:
+    """Listen to what a robot's node publishes."""
     observers: list[Observer] = []
 
     def begin(namespace: str = "") -> Observer:

@@ -7,7 +7,7 @@ import json
 import sys
 import time
 from array import array
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,28 +31,40 @@ class Plan:
 
     Attributes
     ----------
+    report : str
+        File in which is written, at the end, what was added to the recording's stamps (`shift`, s) and how many scans
+        were sent (`scans`).
     pieces : list of [float, float]
         Which seconds of the recording, one after another.
     silent : list of [str, float, float]
         "scan" or "odom", and the seconds of the playing during which it says nothing.
-    mount : list of float
-        x, y, z (m) and quaternion x, y, z, w of the lidar on the base, as the transform says.
+    yaw, upside_down : float, bool
+        How the lidar is turned on the robot, rad; the same drive comes with other angles then.
+    mounted : bool
+        A transform says where the lidar is.
+    standing : bool
+        Odometry comes before anybody listens, of a robot that stands.
     """
 
     recording: str
+    report: str
     namespace: str = ""
     prefix: str = ""
     pieces: list[list[float]] = field(default_factory=lambda: [[0.0, 1e9]])
     silent: list[list[Any]] = field(default_factory=list)
     odometry: str = "topic"
-    mount: list[float] = field(default_factory=lambda: [0.1, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0])
+    yaw: float = 0.0
     upside_down: bool = False
+    mounted: bool = True
+    standing: bool = False
     clock: bool = False
     rate: float = 1.0
 
-    def write(self, path: Path) -> Path:
-        path.write_text(json.dumps(asdict(self)))
-        return path
+    @property
+    def turn(self) -> Quaternion:
+        """Orientation of the lidar on the base: turned about z, after it was turned over about x."""
+        upright = quaternion(self.yaw)
+        return Quaternion(x=upright.w, y=upright.z, z=0.0, w=0.0) if self.upside_down else upright
 
 
 def stamp(seconds: float) -> Time:
@@ -60,15 +72,13 @@ def stamp(seconds: float) -> Time:
     return Time(sec=whole, nanosec=nanoseconds)
 
 
-def scan_message(scan: LaserScan, at: float, frame: str, upside_down: bool) -> ScanMessage:
+def scan_message(scan: LaserScan, at: float, frame: str, plan: Plan) -> ScanMessage:
     count = len(scan.ranges)
     message = ScanMessage()
     message.header.stamp, message.header.frame_id = stamp(at), frame
-    message.angle_min, message.angle_max = float(scan.angles[0]), float(scan.angles[-1])
-    message.angle_increment = float(scan.angles[-1] - scan.angles[0]) / (count - 1)
-    if upside_down:
-        message.angle_min, message.angle_max = -message.angle_min, -message.angle_max
-        message.angle_increment = -message.angle_increment
+    seen = plan.yaw - scan.angles if plan.upside_down else scan.angles - plan.yaw
+    message.angle_min, message.angle_max = float(seen[0]), float(seen[-1])
+    message.angle_increment = float(seen[-1] - seen[0]) / (count - 1)
     message.time_increment = float(scan.offsets[-1]) / (count - 1)
     message.scan_time = message.time_increment * count
     message.range_min, message.range_max = scan.range_min, scan.range_max
@@ -111,16 +121,18 @@ def play(plan: Plan) -> None:
     still = node.create_publisher(
         TFMessage, "/tf_static", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     )
-    x, y, z, *turn = plan.mount
-    turned = Quaternion(**dict(zip("xyzw", turn, strict=True)))
-    still.publish(transform(0.0, plan.prefix + "base_link", plan.prefix + "laser", x, y, turned, z))
-    while not scans.get_subscription_count() or (plan.odometry == "topic" and not wheels.get_subscription_count()):
-        rclpy.spin_once(node, timeout_sec=0.05)
+    if plan.mounted:
+        still.publish(transform(0.0, plan.prefix + "base_link", plan.prefix + "laser", 0.1, 0.0, plan.turn, 0.2))
+    first = next(message for message in messages if isinstance(message, Odometry))
+    while not (scans.get_subscription_count() and (wheels.get_subscription_count() or plan.odometry != "topic")):
+        if plan.standing:
+            wheels.publish(odometry_message(first, time.time(), plan.prefix))
         time.sleep(0.02)
     time.sleep(0.5)
 
     began, passed = time.monotonic(), 0.0
     wall = time.time()
+    sent = 0
     for first, last in plan.pieces:
         piece = [(t - zero, m) for t, m in zip(times, messages, strict=True) if first <= t - zero < last]
         for since_zero, message in piece:
@@ -135,7 +147,8 @@ def play(plan: Plan) -> None:
             if any(name == kind and a <= playing < b for name, a, b in plan.silent):
                 continue
             if isinstance(message, LaserScan):
-                scans.publish(scan_message(message, at, plan.prefix + "laser", plan.upside_down))
+                sent += 1
+                scans.publish(scan_message(message, at, plan.prefix + "laser", plan))
             elif plan.odometry == "topic":
                 wheels.publish(odometry_message(message, at, plan.prefix))
             elif plan.odometry == "tf":
@@ -145,6 +158,7 @@ def play(plan: Plan) -> None:
                 )
         passed += min(last, times[-1] - zero) - first
     time.sleep(1.0)
+    Path(plan.report).write_text(json.dumps({"shift": 0.0 if plan.clock else wall - zero, "scans": sent}))
     node.destroy_node()
     rclpy.shutdown()
 

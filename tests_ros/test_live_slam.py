@@ -1,23 +1,21 @@
 """The node slam beside a robot that drives: as true as offline, no scan lost, and at once."""
 
-import json
-import subprocess
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 from contourslam_msgs.srv import LoadMap, SaveMap
 from diagnostic_msgs.msg import DiagnosticStatus
 from observer import Observer, error_of, wait_for
 
+from conftest import Processes
 from contourslam.maps.file import load_map
 from contourslam.replay import replay
 from contourslam.scan import LaserScan, Odometry
 from contourslam.simulation.simulate import SimulatedRun
 from contourslam_ros.settings import Settings
 
-Start = Callable[..., "subprocess.Popen[str]"]
 Observe = Callable[..., Observer]
 
 
@@ -27,15 +25,15 @@ def values(status: DiagnosticStatus | None) -> dict[str, str]:
 
 
 def test_live_is_as_true_as_offline_loses_no_scan_and_keeps_its_map(
-    drive: SimulatedRun, start: Start, play: Start, observe: Observe, tmp_path: Path
+    drive: SimulatedRun, processes: Processes, observe: Observe, tmp_path: Path
 ) -> None:
     messages = [m for m in drive.messages() if isinstance(m, LaserScan | Odometry)]
     offline = replay(messages, Settings().core, lidar_mount=drive.lidar_mount)
     online = offline.poses if offline.online_poses is None else offline.online_poses
     kept = tmp_path / "kept.map"
-    node = start("slam", map_file=kept)
+    node = processes.start("slam", map_file=kept)
     observer = observe()
-    assert play().wait(200.0) == 0
+    assert processes.play().wait(200.0) == 0
     wait_for(lambda: len(observer.poses) >= len(offline.stamps), 5.0)
     assert len(observer.poses) == len(offline.stamps)  # no scan was lost
     heard = values(observer.latest("scans"))
@@ -43,7 +41,7 @@ def test_live_is_as_true_as_offline_loses_no_scan_and_keeps_its_map(
 
     stamps, poses = observer.trajectory()
     assert (np.diff(stamps) > 0.0).all()
-    stamps += offline.stamps[0] - stamps[0]
+    stamps -= processes.played()["shift"]
     at_offline = error_of(drive, offline.stamps, online)
     assert np.sqrt(np.mean(error_of(drive, stamps, poses) ** 2)) < 1.2 * np.sqrt(np.mean(at_offline**2)) + 1e-3
     # The covariance holds what the pose is off by, and only x, y and heading are unsure.
@@ -70,7 +68,6 @@ def test_live_is_as_true_as_offline_loses_no_scan_and_keeps_its_map(
     assert not refused.success
     assert "absent.map" in refused.message
 
-    node.terminate()
+    node.send_signal(signal.SIGINT)
     assert node.wait(20.0) == 0
     assert len(load_map(kept).corners.ids) == len(load_map(tmp_path / "other.map").corners.ids)
-    json, pytest

@@ -20,6 +20,7 @@ from contourslam.live.warming import warm_up
 from contourslam.live.worker import Worker
 from contourslam.scan import LaserScan, Odometry
 from contourslam_ros.frames import SENT
+from contourslam_ros.grid_sender import GridSender
 from contourslam_ros.latency import Latencies
 from contourslam_ros.map_sender import MapSender
 from contourslam_ros.messages import diagnostic_message, header, pose_message, transform_message
@@ -33,8 +34,8 @@ HELD = 200  # odometry readings before the first scan
 class LiveNode(Node):
     """A node around a session; what the session is for is said by :meth:`begin`.
 
-    The node's thread takes in messages. The worker's thread makes poses and sends them at once; and the map right after
-    a pose, when the next scan is farthest off.
+    The node's thread takes in messages and sends the map; the worker's thread makes poses and sends them at once, and
+    draws the map up while no scan waits.
 
     Parameters
     ----------
@@ -83,12 +84,14 @@ class LiveNode(Node):
     def start(self) -> None:
         """Publish and subscribe; from here on messages come in."""
         self._poses = self.create_publisher(PoseWithCovarianceStamped, "pose", 10)
-        self._map = MapSender(self, self.config)
+        self._map, self._grid = MapSender(self, self.config), GridSender(self, self.config)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._transforms = self.create_publisher(TFMessage, "/tf", SENT)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, self._send_diagnostics, clock=steady)
-        self.create_timer(self.config.map_period, self._send_map_when_idle, clock=steady)
+        self.create_timer(self.config.map_period, self._send_map, clock=steady)
+        if self.config.grid_period > 0.0:
+            self.create_timer(self.config.grid_period, self._send_grid, clock=steady)
         if self.config.publish_tf and self.config.odometry != "none":
             self.create_timer(self.config.tf_period, self._send_transform, clock=steady)
         Services(self, self.running, self.config.map_file)
@@ -99,6 +102,7 @@ class LiveNode(Node):
         if self._worker is not None:
             self._worker.stop()
             self._worker = self._session = None
+            self._grid.close()
 
     def running(self) -> Session:
         """Give the session.
@@ -152,8 +156,6 @@ class LiveNode(Node):
         if self.config.publish_tf and self.config.odometry == "none":
             base = transform_message(head, self.config.frame(self.config.base_frame), done.T_map_base)
             self._transforms.publish(TFMessage(transforms=[base]))
-        if self._session is not None:
-            self._map.send(self._session)
 
     def _on_failure(self, error: BaseException) -> None:
         self.failure = error
@@ -168,10 +170,13 @@ class LiveNode(Node):
         odom = transform_message(head, self.config.frame(self.config.odom_frame), correction)
         self._transforms.publish(TFMessage(transforms=[odom]))
 
-    def _send_map_when_idle(self) -> None:
-        """Send what nobody else does: the map after the last scan, or one just loaded."""
+    def _send_map(self) -> None:
         if self._session is not None:
-            self._map.send(self._session, slack=self.config.map_period)
+            self._map.send(self._session)
+
+    def _send_grid(self) -> None:
+        if self._session is not None and self._sensors.mounting is not None:
+            self._grid.send(self._session, self._sensors.mounting.pose)
 
     def _send_diagnostics(self) -> None:
         if self._session is None:

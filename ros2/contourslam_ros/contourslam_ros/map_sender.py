@@ -1,8 +1,4 @@
-"""The map as messages, sent where it has changed and somebody listens."""
-
-import math
-import threading
-import time
+"""Corners and walls as messages, sent where they have changed and somebody listens."""
 
 from contourslam_msgs.msg import LandmarkMap
 from rclpy.node import Node
@@ -32,36 +28,18 @@ class MapSender:
         self._node, self._config = node, config
         self._landmarks = node.create_publisher(LandmarkMap, "landmarks", LATCHED)
         self._markers = node.create_publisher(MarkerArray, "markers", LATCHED)
-        self._versions: dict[Publisher, int] = {self._landmarks: -1, self._markers: -1}
-        self._sent_at = -math.inf
-        self._busy = threading.Lock()
+        self._sent: dict[Publisher, object] = {}
 
-    def send(self, session: Session, *, slack: float = 0.0) -> None:
-        """Send what is due; may be called from any thread.
-
-        Parameters
-        ----------
-        session : Session
-        slack : float
-            Leave it to others until it is overdue by this much, s.
-        """
-        due = self._sent_at + self._config.map_period + slack
-        if time.monotonic() < due or not self._busy.acquire(blocking=False):
+    def send(self, session: Session) -> None:
+        """Send the map as it was drawn up last to those who have not had it."""
+        listened_to = [p for p in (self._landmarks, self._markers) if p.get_subscription_count()]
+        drawn = session.latest_map() if listened_to else None
+        wanted = [p for p in listened_to if drawn is not None and self._sent.get(p) is not drawn]
+        if drawn is None or not wanted:
             return
-        try:
-            version = session.map_version
-            wanted = [p for p, sent in self._versions.items() if sent != version and p.get_subscription_count()]
-            if wanted:
-                self._sent_at = time.monotonic()
-                self._versions.update(dict.fromkeys(wanted, version))
-                self._publish(session, wanted)
-        finally:
-            self._busy.release()
-
-    def _publish(self, session: Session, wanted: list[Publisher]) -> None:
-        corners, walls = session.corner_map(), session.wall_map()
+        self._sent.update(dict.fromkeys(wanted, drawn))
         head = header(self._node.get_clock().now().to_msg(), self._config.frame(self._config.map_frame))
         if self._landmarks in wanted:
-            self._landmarks.publish(landmark_message(head, corners, walls))
+            self._landmarks.publish(landmark_message(head, drawn.corners, drawn.walls))
         if self._markers in wanted:
-            self._markers.publish(map_markers(head, corners, walls, self._config.ellipse_sigmas))
+            self._markers.publish(map_markers(head, drawn.corners, drawn.walls, self._config.ellipse_sigmas))

@@ -6,6 +6,7 @@ from typing import Any
 
 import gtsam
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.config import Config
 from contourslam.contour.contours import Floats, Ints
@@ -50,6 +51,16 @@ def kept(slam: GraphSlam, about: Mapping[str, str]) -> SavedMap:
         _stretches(memory),
         dict(about),
     )
+
+
+def standing(slam: GraphSlam) -> tuple[Floats, tuple[NDArray[np.float32], ...]]:
+    """Poses of the keyframes as they stand now, shape (k, 3), and the contour of each in the frame of the base.
+
+    The contours are those of the graph itself, for they never change: this takes a millisecond or two.
+    """
+    memory, count = slam.memory, len(slam.memory.keyframes)
+    poses = poses_of(memory.graph.estimate(count), count) if slam.settled is None else slam.settled.poses
+    return poses, tuple(keyframe.oriented for keyframe in memory.keyframes)
 
 
 def _contoured(keyframes: list[Keyframe], settled: Settled) -> Contoured:

@@ -1,0 +1,128 @@
+"""The package as colcon installs it, and its launch files over a stand-in of the launch system, which no wheel has."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from ruamel.yaml import YAML
+
+from contourslam_ros.settings import NodeConfig
+
+PACKAGE = Path(__file__).parents[1] / "ros2" / "contourslam_ros"
+MESSAGES = PACKAGE.with_name("contourslam_msgs")
+LAUNCHES = {"mapping": "slam", "localization": "localization", "replay": "replay"}
+NAMES = {
+    "launch": ["LaunchDescription"],
+    "launch.actions": ["DeclareLaunchArgument"],
+    "launch.conditions": ["IfCondition"],
+    "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution"],
+    "launch_ros": [],
+    "launch_ros.actions": ["Node"],
+    "launch_ros.parameter_descriptions": ["ParameterValue"],
+    "launch_ros.substitutions": ["FindPackageShare"],
+}
+
+
+def stand_in(name: str) -> Callable[..., Any]:
+    """A class that remembers what it was made with."""
+    return lambda *values, **named: SimpleNamespace(kind=name, values=values, named=named)
+
+
+def entities(name: str, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What a launch file starts and declares."""
+    for module, names in NAMES.items():
+        made: Any = ModuleType(module)
+        for one in names:
+            setattr(made, one, stand_in(one))
+        monkeypatch.setitem(sys.modules, module, made)
+    spec = spec_from_file_location(f"{name}_launch", PACKAGE / "launch" / f"{name}.launch.py")
+    assert spec is not None
+    assert spec.loader is not None
+    found = module_from_spec(spec)
+    spec.loader.exec_module(found)
+    (listed,) = found.generate_launch_description().values
+    return list(listed)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package, installed as colcon does it, from a copy, for setuptools writes beside what it installs."""
+    folder = tmp_path_factory.mktemp("workspace")
+    subprocess.run(["cp", "-r", str(PACKAGE), str(folder / "source")], check=True)
+    prefix = folder / "install"
+    words = [sys.executable, "-W", "ignore", "setup.py", "--quiet", "install", "--prefix", str(prefix)]
+    words += ["--single-version-externally-managed", "--record", str(folder / "record")]
+    (prefix / "lib").mkdir(parents=True)
+    subprocess.run(words, cwd=folder / "source", check=True, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"})
+    return prefix
+
+
+def test_nodes_and_what_they_need_are_where_ros_looks_for_them(installed: Path) -> None:
+    share = installed / "share" / "contourslam_ros"
+    assert (installed / "share/ament_index/resource_index/packages/contourslam_ros").exists()
+    assert (share / "package.xml").read_text() == (PACKAGE / "package.xml").read_text()
+    for folder in ("launch", "config", "rviz"):
+        names = {path.name for path in (PACKAGE / folder).iterdir() if path.is_file()}
+        assert names == {path.name for path in (share / folder).iterdir()}
+    programs = {path.name for path in (installed / "lib" / "contourslam_ros").iterdir()}
+    assert programs == set(LAUNCHES.values())
+
+
+@pytest.mark.parametrize("name", LAUNCHES)
+def test_a_launch_file_names_what_is_there(name: str, installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = entities(name, monkeypatch)
+    declared = [item.values[0] for item in found if item.kind == "DeclareLaunchArgument"]
+    assert len(set(declared)) == len(declared)
+    nodes = {item.named["package"]: item for item in found if item.kind == "Node"}
+    node = nodes["contourslam_ros"].named
+    assert node["executable"] == LAUNCHES[name]
+    file, given = node["parameters"]
+    assert file.values == ("params_file",)
+    own = set(NodeConfig.__dataclass_fields__) | {"use_sim_time"}
+    own |= {"bag", "output", "scan_topic", "odometry_topic", "overwrite", "grid"} if name == "replay" else set()
+    assert set(given) <= own
+    used = [part.values[0].values[0] for part in given.values()] + [
+        to.values[0] for _, to in node.get("remappings", [])
+    ]
+    assert set(used) <= set(declared)
+    assert {wanted for wanted, _ in node.get("remappings", [])} <= {"scan", "odom"}
+    (default,) = (
+        i.named["default_value"] for i in found if i.kind == "DeclareLaunchArgument" and i.values[0] == "params_file"
+    )
+    ((share, *parts),) = default.values
+    assert installed.joinpath("share", *share.values, *parts).is_file()
+    if "rviz2" in nodes:
+        ((share, *parts),) = nodes["rviz2"].named["arguments"][1].values
+        assert installed.joinpath("share", *share.values, *parts).is_file()
+
+
+def test_rviz_shows_topics_that_the_nodes_publish_with_the_quality_of_service_they_have() -> None:
+    content = YAML(typ="safe").load(PACKAGE / "rviz" / "contourslam.rviz")
+    shown = {d["Topic"]["Value"]: d["Topic"] for d in content["Visualization Manager"]["Displays"] if "Topic" in d}
+    assert set(shown) == {"map", "markers", "scan", "pose"}
+    assert {name for name, topic in shown.items() if topic["Durability Policy"] == "Transient Local"} == {
+        "map",
+        "markers",
+    }
+    assert shown["scan"]["Reliability Policy"] == "Best Effort"
+
+
+@pytest.mark.parametrize("folder", [PACKAGE, MESSAGES])
+def test_a_package_declares_what_its_files_import(folder: Path) -> None:
+    root = ElementTree.parse(folder / "package.xml").getroot()
+    declared = {element.text for element in root if element.tag.endswith("depend")}
+    sources = "\n".join(path.read_text() for path in folder.rglob("*") if path.suffix in (".py", ".msg", ".srv"))
+    known = ["rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "builtin_interfaces", "tf2_msgs"]
+    known += [
+        f"{name}_msgs" for name in ("std", "sensor", "nav", "geometry", "visualization", "diagnostic", "contourslam")
+    ]
+    known += ["std_srvs"]
+    imported = {n for n in known if f"from {n}" in sources or f"import {n}" in sources or f"\n{n}/" in f"\n{sources}"}
+    assert imported - {root.findtext("name")} <= declared

@@ -1,0 +1,106 @@
+"""What goes wrong on robots: each is named, and the pose is right again within two seconds of its end.
+
+The robots drive at the same time, in namespaces of their own, for a test that waits costs what it waits.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from observer import Observer, error_of
+
+from conftest import Processes
+from contourslam.simulation.simulate import SimulatedRun
+
+CLOSE = 0.1  # m
+RIGHT_AGAIN = 2.0  # s after the return
+GAP = (7.0, 12.0)
+LENGTH = 18.0
+
+
+@dataclass
+class Trouble:
+    plan: dict[str, Any] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+TROUBLES = {
+    "early": Trouble({"silent": [["odom", 0.0, 6.0]]}),
+    "late": Trouble({"standing": True}),
+    "without": Trouble({"odometry": "none"}),
+    "wheels_stop": Trouble({"silent": [["odom", *GAP]]}),
+    "scans_stop": Trouble({"silent": [["scan", *GAP]]}),
+    "time_runs_back": Trouble({"clock": True, "pieces": [[0.0, 9.0], [0.0, 9.0]]}, {"use_sim_time": True}),
+}
+
+
+@dataclass
+class Seen:
+    observer: Observer
+    stamps: np.ndarray
+    errors: np.ndarray
+    sent: float
+
+
+@pytest.fixture(scope="module")
+def seen(drive: SimulatedRun, processes: Processes, observe: Callable[[str], Observer]) -> dict[str, Seen]:
+    observers = {name: observe(name) for name in TROUBLES}
+    for name, trouble in TROUBLES.items():
+        processes.start("slam", namespace=name, frame_prefix=f"{name}/", **trouble.parameters)
+    players = [
+        processes.play(**{"namespace": name, "prefix": f"{name}/", "pieces": [[0.0, LENGTH]], **trouble.plan})
+        for name, trouble in TROUBLES.items()
+    ]
+    assert [player.wait(120.0) for player in players] == [0] * len(players)
+    found = {}
+    for name, observer in observers.items():
+        stamps, poses = observer.trajectory()
+        played = processes.played(name)
+        stamps -= played["shift"]
+        found[name] = Seen(observer, stamps, error_of(drive, stamps, poses), played["scans"])
+    return found
+
+
+def test_a_node_that_starts_before_the_odometry_says_so_and_is_right(seen: dict[str, Seen]) -> None:
+    early = seen["early"]
+    assert early.observer.said("no odometry has come on /early/odom")
+    assert len(early.stamps) == early.sent
+    assert early.errors[early.stamps > 6.0 + RIGHT_AGAIN].max() < CLOSE
+
+
+def test_a_node_that_starts_after_the_odometry_is_right_from_the_first_scan(seen: dict[str, Seen]) -> None:
+    late = seen["late"]
+    assert not late.observer.said("late/odom")
+    assert len(late.stamps) == late.sent
+    assert late.errors.max() < CLOSE
+
+
+def test_a_robot_without_odometry_is_mapped_and_told_so(seen: dict[str, Seen]) -> None:
+    without = seen["without"]
+    assert without.observer.said("no odometry has come on /without/odom")
+    assert without.errors.max() < CLOSE
+
+
+def test_odometry_that_stops_is_named_and_the_scans_carry_the_pose(seen: dict[str, Seen]) -> None:
+    stopped = seen["wheels_stop"]
+    assert stopped.observer.said("no odometry for", "/wheels_stop/odom")
+    assert len(stopped.stamps) == stopped.sent
+    assert stopped.errors[stopped.stamps > GAP[1] + RIGHT_AGAIN].max() < CLOSE
+
+
+def test_scans_that_stop_are_named_and_the_pose_is_right_after(seen: dict[str, Seen]) -> None:
+    stopped = seen["scans_stop"]
+    assert stopped.observer.said("no scan for", "/scans_stop/scan")
+    assert stopped.errors[stopped.stamps > GAP[1] + RIGHT_AGAIN].max() < CLOSE
+
+
+def test_time_that_runs_back_is_named_and_the_drive_begun_anew(seen: dict[str, Seen]) -> None:
+    back = seen["time_runs_back"]
+    assert back.observer.said("time ran back by")
+    (at,) = np.flatnonzero(np.diff(back.stamps) < 0.0)
+    again = back.stamps[at + 1 :]
+    assert again[0] < 1.0
+    assert back.errors[at + 1 :][again > RIGHT_AGAIN].max() < CLOSE
+    assert len(back.stamps) >= back.sent - 1  # the first from before that runs back shows it, and may be a stray
