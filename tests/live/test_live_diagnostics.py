@@ -65,6 +65,8 @@ def test_when_all_is_well_nothing_is_called_a_fault() -> None:
         (Sensor("/scan", True, 0, 0.3, 0.0, 0.0), Level.OK, "waiting for the first scan on /scan"),
         (Sensor("/scan", True, 0, 3.0, 0.0, 0.0), Level.ERROR, "no scan has come on /scan for 3.0 s: is the lidar's"),
         (Sensor("/scan", True, 9, 5.2, 0.0, 0.0), Level.ERROR, "no scan for 5.2 s on /scan: is the lidar's driver"),
+        (Sensor("/scan", True, 9, 1.2, 10.0, 10.0), Level.ERROR, "no scan for 1.2 s on /scan"),
+        (Sensor("/scan", True, 9, 1.2, 0.7, 0.7), Level.OK, "0.7 scans a second"),
     ],
 )
 def test_scans_that_do_not_come(sensor: Sensor, level: Level, words: str) -> None:

@@ -18,6 +18,7 @@ ADVICE = {
     Reason.BEFORE_JUMP: "they were on their way when time ran back",
 }
 MOST_NIS, FEWEST_DOF = 2.0, 30  # corrections are called inconsistent beyond this, and not on less evidence
+SLOW = 3.0  # times the usual time between two messages, after which the next one is missing
 ENOUGH = 10  # scans that show how well they fit
 
 
@@ -137,6 +138,12 @@ def diagnose(condition: Condition, config: LiveConfig) -> tuple[Diagnostic, ...]
     )
 
 
+def _has_stopped(sensor: Sensor, config: LiveConfig) -> bool:
+    """Whether a sensor is silent for longer than it usually is; some lidars scan less than once a second."""
+    usual = SLOW / sensor.by_arrival if sensor.by_arrival > 0.0 else 0.0
+    return sensor.silent >= max(config.silent_after, usual)
+
+
 def _scans(c: Condition, config: LiveConfig) -> tuple[Level, str, str]:
     name, scans = "scans", c.scans
     if scans.number == 0:
@@ -146,7 +153,7 @@ def _scans(c: Condition, config: LiveConfig) -> tuple[Level, str, str]:
             f"no scan has come on {scans.topic} for {scans.silent:.1f} s: "
             "is the lidar's driver running, and is this its topic?"
         )  # fmt: skip
-    if scans.silent >= config.silent_after:
+    if _has_stopped(scans, config):
         return Level.ERROR, name, f"no scan for {scans.silent:.1f} s on {scans.topic}: is the lidar's driver running?"
     if c.paused:
         return Level.WARN, name, "paused: scans are left out until resumed"
@@ -173,7 +180,7 @@ def _odometry(c: Condition, config: LiveConfig) -> tuple[Level, str, str]:
             f"no odometry has come on {odometry.topic} for {odometry.silent:.1f} s: motion is guessed from the scans "
             "alone; is the base driver running, and is this its topic?"
         )  # fmt: skip
-    if odometry.silent >= config.silent_after:
+    if _has_stopped(odometry, config):
         return Level.ERROR, name, (
             f"no odometry for {odometry.silent:.1f} s on {odometry.topic}: motion is guessed from the scans alone; "
             "is the base driver running?"
