@@ -51,7 +51,7 @@ class WarmUp:
 
         start = perf_counter()
         with tempfile.TemporaryDirectory() as folder, watch_compilation(begun), bar:
-            for name, run in stages(Path(folder)):
+            for name, run in [*stages(Path(folder)), ("occupancy grid", _draw_grid)]:
                 bar.set_description_str(name)
                 run()
         seconds, place = perf_counter() - start, cache_folder()
@@ -64,3 +64,12 @@ class WarmUp:
         if not self.check and "gtsam" not in sys.modules:
             note("the graph back end was left out: GTSAM is not installed")
         return 0
+
+
+def _draw_grid() -> None:
+    """Let one beam into an occupancy grid, which a node publishes."""
+    import numpy as np
+
+    from contourslam.report.occupancy import OccupancyGrid
+
+    OccupancyGrid().add(np.zeros((1, 2)), np.ones((1, 2)))

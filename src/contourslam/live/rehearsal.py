@@ -43,6 +43,8 @@ def stages(folder: Path) -> list[Stage]:
     for name, config in back_ends.items():
         file = folder / f"{len(found)}.map"
         found.append((f"mapping, {name}", partial(_map, config, file)))
+    if "graph" in back_ends:
+        found.append(("continuing a map", partial(_continue, back_ends["graph"], folder / "0.map")))
     found.append(("localising", partial(_localise, FILTER, folder / "0.map")))
     for detector in DETECTORS:
         config = Config(detector=detector)
@@ -59,6 +61,12 @@ def _map(config: Config, file: Path) -> None:
     session.save(file)
     session.close()
     warm_up(config, laps=SHORT)  # and to the end of a recording, which a session never comes to
+
+
+def _continue(config: Config, file: Path) -> None:
+    session = mapping(config, LiveConfig(), map_file=file)
+    warm_up(config, cast(Mapper, _Through(session)))
+    session.close()
 
 
 def _localise(config: Config, file: Path) -> None:
