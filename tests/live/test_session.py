@@ -234,10 +234,11 @@ def test_a_recording_that_begins_again_is_named_and_the_pose_is_right_again(
     assert sum(i.lost for p in told.done for i in p.incidents) <= 2
 
 
-def test_a_clock_set_back_in_mid_drive_loses_neither_map_nor_pose(stream: Streams) -> None:
+@pytest.mark.parametrize("config", [EKF, GRAPH], ids=["ekf", "graph"])
+def test_a_clock_set_back_in_mid_drive_loses_neither_map_nor_pose(stream: Streams, config: Config) -> None:
     drive = stream(9.0)
     behind = [(t, m if t < 4.0 else replace(m, stamp=m.stamp - 500.0)) for t, m in drive.messages]
-    session = new(drive)
+    session = new(drive, config)
     told = run(session, behind)
     _, errors = told.errors(lambda s: drive.truth(s if s >= drive.start else s + 500.0))
     assert errors.max() < 0.05
@@ -247,7 +248,8 @@ def test_a_clock_set_back_in_mid_drive_loses_neither_map_nor_pose(stream: Stream
     assert set(session.wall_map().ids.tolist()) & {i for p in told.done[:30] for i in p.update.born}
 
 
-def test_a_base_driver_started_again_in_mid_drive_is_no_motion(stream: Streams) -> None:
+@pytest.mark.parametrize("config", [EKF, GRAPH], ids=["ekf", "graph"])
+def test_a_base_driver_started_again_in_mid_drive_is_no_motion(stream: Streams, config: Config) -> None:
     drive = stream(9.0)
     moved = [
         (
@@ -258,7 +260,7 @@ def test_a_base_driver_started_again_in_mid_drive_is_no_motion(stream: Streams) 
         )
         for t, m in drive.messages
     ]
-    told = run(new(drive), moved)
+    told = run(new(drive, config), moved)
     assert told.errors(drive.truth)[1].max() < 0.03
     assert "the odometry leapt by" in told.at(5.0, "odometry").message
     way = np.diff([compose(p.T_map_odom_smooth, p.T_odom_base) for p in told.done], axis=0)
