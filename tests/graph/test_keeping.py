@@ -295,3 +295,12 @@ def test_a_building_that_begins_like_this_one_is_told_apart(building: int) -> No
 
 def test_nothing_shows_no_start() -> None:
     assert find_start(first_map(), CONFIG, [], lidar_mount=np.array(MOUNT)) is None
+
+
+def test_the_old_map_stands_as_it_was_kept_until_the_new_drive_moves_it() -> None:
+    saved = first_map()
+    assert saved.keyframes is not None
+    slam = go_on(saved, truth()[half()])
+    feed(slam, part(half(), half() + 2))
+    poses = slam.memory.graph.poses(range(len(saved.keyframes)))
+    np.testing.assert_allclose(poses, saved.keyframes.poses, atol=1e-6)

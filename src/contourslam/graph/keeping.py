@@ -200,7 +200,9 @@ def _keyframes(kept: Contoured) -> list[Keyframe]:
 
 
 def _bind(memory: Memory, poses: Floats, relations: Relations) -> None:
+    """Take in all relations; the map stays as it was kept, where landmarks had their say too, until loops move it."""
     graph = memory.graph
+    now = between(poses[relations.first], poses[relations.second])
     for key, pose in enumerate(poses):
         graph.add(key, pose)
     for i in range(len(relations.first)):
@@ -210,7 +212,8 @@ def _bind(memory: Memory, poses: Floats, relations: Relations) -> None:
             graph.fix(second, relations.poses[i], 1.0 / np.sqrt(np.diag(information)))
         else:
             robust = None if math.isnan(width) else width
-            graph.relate(first, second, relations.poses[i], information, robust, tie=bool(relations.ties[i]))
+            tie = bool(relations.ties[i])
+            graph.recall(first, second, relations.poses[i], information, robust, tie=tie, now=now[i])
     graph.update()
 
 

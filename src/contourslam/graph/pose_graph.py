@@ -83,6 +83,13 @@ class PoseGraph:
         """Say where `second` lies, seen from `first`; `information` is in the frame of `second`."""
         self._put(relation(first, second, pose, information, robust), self.ties if tie else self.factors)
 
+    def recall(
+        self, first: int, second: int, pose: Floats, information: Floats, robust: Robust, *, tie: bool, now: Floats
+    ) -> None:
+        """As :meth:`relate`, of a solution that is to stay as it is: iSAM2 is told how `second` lies `now`."""
+        self._new.push_back(relation(first, second, now, information, robust))
+        (self.ties if tie else self.factors).push_back(relation(first, second, pose, information, robust))
+
     def sight(self, key: int, variable: int, pose: Floats, information: Floats, robust: Robust = None) -> None:
         """As :meth:`relate`, of a landmark: iSAM2 gets it, and it is not kept."""
         self._new.push_back(relation(key, variable, pose, information, robust))
