@@ -11,6 +11,7 @@ import rclpy
 from contourslam_msgs.msg import LandmarkMap
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from nav_msgs.msg import OccupancyGrid
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
@@ -42,11 +43,13 @@ class Observer:
         self.told: list[tuple[float, DiagnosticStatus]] = []
         self.landmarks: LandmarkMap | None = None
         self.markers: MarkerArray | None = None
+        self.grid: OccupancyGrid | None = None
         self.frames: set[str] = set()
         listen = self.node.create_subscription
         listen(PoseWithCovarianceStamped, "pose", self._on_pose, 1000)
         listen(LandmarkMap, "landmarks", lambda message: setattr(self, "landmarks", message), LATCHED)
         listen(MarkerArray, "markers", lambda message: setattr(self, "markers", message), LATCHED)
+        listen(OccupancyGrid, "map", lambda message: setattr(self, "grid", message), LATCHED)
         listen(TFMessage, "/tf", lambda message: self.transforms.extend(message.transforms), 1000)
         listen(DiagnosticArray, "/diagnostics", self._on_told, 100)
         self._executor = SingleThreadedExecutor()

@@ -3,6 +3,7 @@
 Stamps are those of the wall clock at which a message belongs, or with `clock` those of the recording, with /clock.
 """
 
+import faulthandler
 import json
 import sys
 import time
@@ -164,4 +165,5 @@ def play(plan: Plan) -> None:
 
 
 if __name__ == "__main__":
+    faulthandler.dump_traceback_later(200.0, exit=True)  # no plan takes so long
     play(Plan(**json.loads(Path(sys.argv[1]).read_text())))

@@ -5,8 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from contourslam_msgs.msg import LandmarkMap
 from contourslam_msgs.srv import LoadMap, SaveMap
 from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import OccupancyGrid
 from observer import Observer, error_of, wait_for
 
 from conftest import Processes
@@ -22,6 +24,16 @@ Observe = Callable[..., Observer]
 def values(status: DiagnosticStatus | None) -> dict[str, str]:
     assert status is not None
     return {value.key: value.value for value in status.values}
+
+
+def part_on_walls(grid: OccupancyGrid, landmarks: LandmarkMap) -> float:
+    """Part of the walls' middles that lie within a decimetre of a cell that is occupied."""
+    cells = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
+    assert set(np.unique(cells)) == {-1, 0, 100}
+    corner = np.array([grid.info.origin.position.x, grid.info.origin.position.y])
+    occupied = (np.argwhere(cells == 100)[:, ::-1] + 0.5) * grid.info.resolution + corner
+    middles = np.array([[(a.x + b.x) / 2.0, (a.y + b.y) / 2.0] for a, b in (wall.ends for wall in landmarks.walls)])
+    return float(np.mean(np.min(np.hypot(*(middles[:, None] - occupied).T), axis=0) < 0.1))
 
 
 def test_live_is_as_true_as_offline_loses_no_scan_and_keeps_its_map(
@@ -61,6 +73,8 @@ def test_live_is_as_true_as_offline_loses_no_scan_and_keeps_its_map(
     assert drawn["corners"] == len(observer.landmarks.corners)
     assert drawn["walls"] == 2 * len(observer.landmarks.walls)
     assert drawn["corner_ellipses"] == 32 * len(observer.landmarks.corners)
+    assert observer.grid is not None
+    assert part_on_walls(observer.grid, observer.landmarks) > 0.9
     answer = observer.call(SaveMap, "slam/save", path=str(tmp_path / "other.map"))
     assert answer.success, answer.message
     assert set(load_map(tmp_path / "other.map").corners.ids) == {corner.id for corner in observer.landmarks.corners}

@@ -34,7 +34,7 @@ def robots(processes: Processes, observe: Callable[[str], Observer]) -> dict[str
         processes.play(**{"namespace": name, "prefix": f"{name}/", "pieces": PIECES, **plan})
         for name, plan in PLANS.items()
     ]
-    assert [player.wait(120.0) for player in players] == [0] * len(players)
+    assert [player.wait(240.0) for player in players] == [0] * len(players)
     return observers
 
 
