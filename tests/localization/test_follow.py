@@ -243,6 +243,21 @@ def test_without_any_odometry_scans_are_undone_the_motion_that_the_map_shows() -
     assert way.rmse < 0.01  # 20 mm where a scan is taken as if the robot stood still
 
 
+@pytest.mark.parametrize("fault", ["odometry_begins_late", "scans_stop", "all_stops", "time_runs_back"])
+def test_what_a_recording_can_throw_at_it_leaves_the_robot_where_it_is(fault: str) -> None:
+    messages = drive(200)
+    late = {
+        "odometry_begins_late": [m for m in messages if not (isinstance(m, Odometry) and m.stamp < 8.0)],
+        "scans_stop": [m for m in messages if not (isinstance(m, LaserScan) and 8.0 < m.stamp < 13.0)],
+        "all_stops": [m for m in messages if not 8.0 < m.stamp < 13.0],
+        "time_runs_back": [*(m for m in messages if m.stamp < 12.0), *messages],
+    }[fault]
+    way = follow(localizer(first_pose(messages)), late)
+    assert way.localized[-PER_SECOND:].all()
+    assert way.localized[3:].mean() > 0.9
+    assert way.rmse < 0.02
+
+
 def test_wheels_that_stall_or_spin_do_not_pull_the_robot_along() -> None:
     slip, seen = np.array([0.3, 0.0, 0.2]), 0
     messages: list[Message] = []
