@@ -33,8 +33,8 @@ class Plan:
     Attributes
     ----------
     report : str
-        File in which is written, at the end, what was added to the recording's stamps (`shift`, s) and how many scans
-        were sent (`scans`).
+        File for what was added to the recording's stamps in the first piece (`shift`, s), and how many scans were sent
+        (`scans`); written at the end.
     pieces : list of [float, float]
         Which seconds of the recording, one after another.
     silent : list of [str, float, float]
@@ -159,7 +159,9 @@ def play(plan: Plan) -> None:
                 )
         passed += min(last, times[-1] - zero) - first
     time.sleep(1.0)
-    Path(plan.report).write_text(json.dumps({"shift": 0.0 if plan.clock else wall - zero, "scans": sent}))
+    Path(plan.report).write_text(
+        json.dumps({"shift": 0.0 if plan.clock else wall - zero - plan.pieces[0][0], "scans": sent})
+    )
     node.destroy_node()
     rclpy.shutdown()
 
