@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ros bench bench-scale check clean
+.PHONY: help demo test test-ros bench bench-scale bench-ros check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -37,6 +37,9 @@ bench: $(VENV)/.dev ## Measure speed, size and accuracy on real logs; rewrite th
 
 bench-scale: $(VENV)/.dev ## Measure time, memory and error against distance in simulated buildings, up to 10 km.
 	$(BIN)/python benchmarks/bench_scale.py --write
+
+bench-ros: $(VENV_ROS)/.ready ## Measure the ROS 2 node beside a robot that is played in real time; two minutes.
+	$(VENV_ROS)/bin/python benchmarks/bench_ros.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
 	rm -rf $(VENV) $(VENV_ROS) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

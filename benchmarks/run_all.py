@@ -7,7 +7,8 @@ from pathlib import Path
 
 # The filter's matrices are small: threads of the linear algebra would measure the machine's load, not the code.
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-ON_THEIR_OWN = {"bench_scale"}  # too long to be part of all: `make bench-scale`
+# Too long to be part of all, and in an environment of its own: `make bench-scale`, `make bench-ros`.
+ON_THEIR_OWN = {"bench_scale", "bench_ros"}
 
 
 def main() -> int:

@@ -1,12 +1,10 @@
 """A ROS graph of the tests' own, a simulated drive, and the processes that a test starts."""
 
-import json
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +61,7 @@ class Processes:
     def __init__(self, recording: Path, folder: Path) -> None:
         self._recording, self._folder = recording, folder
         self._running: list[subprocess.Popen[str]] = []
+        self._plans: dict[str, Plan] = {}
 
     def start(self, node: str, *, namespace: str = "", **parameters: object) -> "subprocess.Popen[str]":
         """Start a node; ``__`` in a parameter's name stands for a dot."""
@@ -74,15 +73,15 @@ class Processes:
 
     def play(self, **choices: Any) -> "subprocess.Popen[str]":
         """Play the recording as a :class:`Plan` says."""
-        path = self._folder / f"robot_{choices.get('namespace', '')}.plan"
-        plan = Plan(recording=str(self._recording), report=str(path.with_suffix(".report")), **choices)
-        path.write_text(json.dumps(asdict(plan)))
+        robot = choices.get("namespace", "")
+        path = self._folder / f"robot_{robot}.plan"
+        self._plans[robot] = Plan(recording=str(self._recording), report=str(path.with_suffix(".report")), **choices)
+        path.write_text(self._plans[robot].text())
         return self._run([sys.executable, str(HERE / "player.py"), str(path)])
 
     def played(self, namespace: str = "") -> dict[str, float]:
         """Give what was added to the recording's stamps (`shift`, s), and how many `scans` were sent."""
-        report: dict[str, float] = json.loads((self._folder / f"robot_{namespace}.report").read_text())
-        return report
+        return self._plans[namespace].played()
 
     def _run(self, words: list[str]) -> "subprocess.Popen[str]":
         self._running.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, text=True))

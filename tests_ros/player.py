@@ -8,7 +8,7 @@ import json
 import sys
 import time
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +60,15 @@ class Plan:
     standing: bool = False
     clock: bool = False
     rate: float = 1.0
+
+    def text(self) -> str:
+        """The plan as a file holds it."""
+        return json.dumps(asdict(self))
+
+    def played(self) -> dict[str, float]:
+        """What was reported."""
+        report: dict[str, float] = json.loads(Path(self.report).read_text())
+        return report
 
     @property
     def turn(self) -> Quaternion:
