@@ -385,7 +385,9 @@ def test_the_map_stays_as_it_is() -> None:
     np.testing.assert_array_equal(before.poses, poses)
 
 
-def test_where_the_drive_began_is_known_once_the_robot_is_found() -> None:
-    robot = localizer()
-    way = follow(robot, drive(201))
-    np.testing.assert_allclose(robot.start_pose[:2], way.truth[0, :2], atol=0.03)
+@pytest.mark.parametrize("told", [False, True])
+def test_where_the_drive_began_is_known_once_the_robot_is_found(told: bool) -> None:
+    messages = drive(201)
+    robot = localizer(first_pose(messages) + np.array([0.3, -0.2, 0.15]) if told else None)
+    way = follow(robot, messages)
+    np.testing.assert_allclose(robot.start_pose, way.truth[0], atol=0.03)

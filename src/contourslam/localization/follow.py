@@ -6,17 +6,17 @@ from collections.abc import Callable
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Contours, Floats
+from contourslam.contour.contours import Floats
 from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one
-from contourslam.landmarks import find_landmarks, trace
+from contourslam.landmarks import trace
 from contourslam.localization.fixed_map import make_fixed_map
 from contourslam.localization.known_map import KnownMap
 from contourslam.localization.locate import Locator
 from contourslam.localization.lookout import STILL, Finder, Lookout
 from contourslam.localization.motion import Motion, Step
-from contourslam.localization.sighted import Sighted
+from contourslam.localization.sighted import NO_SIGHT, Sighted
 from contourslam.localization.trust import LEAST_USUAL, Trust
 from contourslam.maps import SavedMap
 from contourslam.matching.align import POINT_SIGMA, Alignment, align
@@ -41,7 +41,6 @@ STRAYED, STRAYED_ANGLE = 1.0, math.radians(30.0)
 # Errors of the map, and of the lidar, are the same from scan to scan at one place: a fix is soon forgotten, so that a
 # robot at rest does not come to believe that it knows more than half of its variance better than one scan says.
 FORGET = 2.0
-LOOK_EVERY = 0.4  # m, or rad turned, after which corners and walls are looked for again
 
 
 class Localizer:
@@ -94,12 +93,11 @@ class Localizer:
         self.config, self._saved, self._lap = config, saved, lap
         self.detector = detector or make_detector(config.detector, adapted=config.adapted)
         self.mount: Floats = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
-        self._map, self._sighted = make_fixed_map(saved), Sighted(saved)
+        self._map, self._sighted = make_fixed_map(saved), Sighted(saved, config, self.detector)
         self._finder: Finder = Locator(KnownMap(saved)) if finder is None else finder
         self._motion = Motion(config.slam)
-        self._way = LOOK_EVERY  # driven since corners and walls were last looked for
+        self._started_at: Floats | None = None
         self.start_over(initial_pose, initial_covariance)
-        self._started_at = self._pose
 
     def start_over(self, pose: Floats | None = None, covariance: Floats | None = None) -> None:
         """Forget where the robot is: it is looked for near a pose, or everywhere.
@@ -119,6 +117,7 @@ class Localizer:
         self._stale = np.zeros((3, 3))  # what of the last fix is to be forgotten
         self._sure, self._since_sure = self._pose, np.zeros(3)  # the last pose beyond doubt, and the wheels since then
         self._lookout: Lookout | None = self._new_lookout()
+        self._checking = True  # some looks are taken also if all is well
 
     def _new_lookout(self) -> Lookout:
         return Lookout(self._finder, self.config.lidar.max_range, self.mount[:2])
@@ -131,7 +130,7 @@ class Localizer:
     @property
     def start_pose(self) -> Floats:
         """Base in the map where it started, as it was known when the robot was found first, shape (3,)."""
-        return self._started_at
+        return self._pose if self._started_at is None else self._started_at
 
     @property
     def odometry_pose(self) -> Floats:
@@ -176,10 +175,13 @@ class Localizer:
         if self._placed:
             self._pose, self._covariance = moved(before, self._covariance + self._stale, increment, noise)
             self._stale = np.zeros((3, 3))
+        beside = None if self._lookout is None else self._lookout.pose
         if len(oriented) >= LEAST_POINTS:
             if self._placed:
                 quality, nis = self._fit(oriented, before, step)
             self._look(oriented, step.blur)
+        if self._started_at is None and self.localized and beside is not None:
+            self._started_at = compose_one(self._pose, between_one(beside, np.zeros(3)))
         followed = self._placed and self._lookout is None
         self._motion.went(between_one(before, self._pose) if followed else increment, sure=followed and quality > POOR)
         if self._trust.poor == 0:
@@ -187,10 +189,15 @@ class Localizer:
         self._lap("matching")
         covariance = self._covariance + self._map.doubt_at(self._pose) if self._placed else self._covariance
         quality = quality if self.localized else 0.0
-        corners, walls, matched = self._landmarks(contours) if self._due(before) else (0, 0, ())
+        sight = NO_SIGHT
+        if self.localized:
+            went = math.dist(before[:2], self._pose[:2]) + abs(wrap_angle(self._pose[2] - before[2]))
+            lidar = compose_one(self._pose, self.mount)
+            sight = self._sighted.look(contours, lidar, went, self._lap)
         return ScanUpdate(
-            scan.stamp, self._pose, covariance, corners, walls, matched, (), (), (), nis, 3 if nis > 0.0 else 0, quality
-        )
+            scan.stamp, self._pose, covariance, sight.corners, sight.walls, sight.matched, (), (), (), nis,
+            3 if nis > 0.0 else 0, quality,
+        )  # fmt: skip
 
     def _step(self, oriented: Floats, step: Step) -> tuple[Floats, Floats]:
         """Motion and covariance: the wheels' while the map is there to mend it, that of the contours otherwise."""
@@ -263,21 +270,19 @@ class Localizer:
         """Where there is doubt, ask where in the whole map the robot is, and believe looks that agree."""
         trust = self._trust
         if trust.check_due:
-            trust.weak_for = 0.0
+            trust.weak_for, self._checking = 0.0, True
             self._look_out(oriented)
         if self._lookout is None:
             return
-        pose = self._lookout.look()
+        pose = self._lookout.look() if trust.poor or self._checking else None
         self._lap("search")
         if pose is not None and self._fits_better(pose, oriented):
             found = align(oriented, self._map.cells, pose, LOOSE)
-            if not self._placed:
-                self._started_at = compose_one(found.pose, between_one(self._lookout.pose, np.zeros(3)))
             self._pose, self._covariance, self._placed = found.pose, invert(LOOSE), True
             self._take(found, oriented, blur)
             trust.found()
-        elif trust.poor == 0 and (pose is not None or self._lookout.looks >= CHECK_LOOKS):
-            self._lookout = None
+        elif trust.poor == 0 and (pose is not None or not self._checking or self._lookout.looks >= CHECK_LOOKS):
+            self._lookout, self._checking = None, False
 
     def _fits_better(self, pose: Floats, oriented: Floats) -> bool:
         """Whether the scan fits at a pose, and clearly better than where the robot is thought to be, if it is."""
@@ -293,18 +298,3 @@ class Localizer:
         after = invert(invert(self._covariance) + information)
         self._pose, self._covariance = found.pose, after
         self._stale = FORGET * after @ information @ after
-
-    def _due(self, before: Floats) -> bool:
-        """Whether corners and walls are worth looking for again."""
-        self._way += math.dist(before[:2], self._pose[:2]) + abs(wrap_angle(self._pose[2] - before[2]))
-        if not self.localized or self._way < LOOK_EVERY:
-            return False
-        self._way = 0.0
-        return True
-
-    def _landmarks(self, contours: Contours) -> tuple[int, int, tuple[int, ...]]:
-        """Corners and walls in the scan, and which of the map's they are."""
-        found = find_landmarks(contours, self.detector, self.config, self._lap)
-        matched = self._sighted.ids(found.corners, found.walls, compose_one(self._pose, self.mount))
-        self._lap("association")
-        return len(found.corners), len(found.walls), matched
