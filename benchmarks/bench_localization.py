@@ -72,7 +72,7 @@ def simulated() -> list[Place]:
             own[f"{room.name}, refurnished, {lidar}"] = [
                 query
                 for seed, other in enumerate(changed)
-                for query in scans_at_random(other, COUNT // 5, seed, field_of_view_deg=degrees)
+                for query in scans_at_random(other, COUNT // 5, seed, mapped=room, field_of_view_deg=degrees)
             ]
         places.append(Place(room.name, Locator(KnownMap(saved)), own, MOUNT))
     return places

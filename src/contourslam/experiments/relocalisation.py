@@ -125,7 +125,14 @@ def map_of(messages: Iterable[Message], config: Config, mount: Floats | None) ->
 
 
 def scans_at_random(
-    room: Room, count: int, seed: int, *, field_of_view_deg: float = 360.0, beams: int = 500, sigma: float = 0.01
+    room: Room,
+    count: int,
+    seed: int,
+    *,
+    mapped: Room | None = None,
+    field_of_view_deg: float = 360.0,
+    beams: int = 500,
+    sigma: float = 0.01,
 ) -> list[Query]:
     """Scans at random free poses of a room.
 
@@ -134,8 +141,9 @@ def scans_at_random(
     room : Room
     count : int
     seed : int
+    mapped : Room, optional
+        The room as it was mapped: poses are free in it too.
     field_of_view_deg : float
-        Degrees.
     beams : int
         Over a whole turn.
     sigma : float
@@ -149,6 +157,8 @@ def scans_at_random(
     import shapely
 
     chance, free = np.random.default_rng(seed), free_space(room, HEIGHT).buffer(-BODY)
+    if mapped is not None:
+        free = free.intersection(free_space(mapped, HEIGHT).buffer(-BODY))
     caster = PlaneCaster(*outlines(room, HEIGHT))
     x0, y0, x1, y1 = free.bounds
     seen = round(beams * field_of_view_deg / 360.0)
