@@ -44,7 +44,7 @@ def stages(folder: Path) -> list[Stage]:
         file = folder / f"{len(found)}.map"
         found.append((f"mapping, {name}", partial(_map, config, file)))
     if "graph" in back_ends:
-        found.append(("continuing a map", partial(_continue, back_ends["graph"], folder / "0.map")))
+        found.append(("continuing a map, graph", partial(_continue, back_ends["graph"], folder / "0.map")))
     found.append(("localising", partial(_localise, FILTER, folder / "0.map")))
     for detector in DETECTORS:
         config = Config(detector=detector)
