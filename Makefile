@@ -22,7 +22,7 @@ demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, wri
 	@echo "Open demo/index.html in a browser; demo/run holds the map of the first recording."
 
 test: $(VENV)/.dev ## Run the tests.
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-ros: $(VENV_ROS)/.ready ## Run the ROS 2 nodes against real rclpy, in an environment of its own (needs a C++ compiler).
 	$(VENV_ROS)/bin/python -m pytest tests_ros
