@@ -8,8 +8,9 @@ import numpy as np
 from contourslam.contour.contours import Floats
 from contourslam.geometry.angles import wrap
 from contourslam.localization.view import View
-from contourslam.matching.search import NEAR, WIDEST_STEP, Flags, Hypothesis, branch_and_bound
+from contourslam.matching.search import WIDEST_STEP, Hypothesis
 from contourslam.matching.search_grid import BLOCK, TOP, SearchGrid, directions_of
+from contourslam.matching.search_tree import NEAR, Flags, branch_and_bound
 
 LEAST_SCORE = 0.35  # a pose of which fewer points touch the map is no candidate
 RIVAL = 0.8  # nor is one that scores less than this part of the best
