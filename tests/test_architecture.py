@@ -14,9 +14,9 @@ ROOT = PACKAGE.parents[1]
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
 GROUND = ("errors", "atomic", "config", "kernels", "geometry", "scan")
 LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "replay")
-ORDER = (*GROUND, *LINE, "live", "recordings", "simulation", "evaluation", "experiments", "report", "cli")
-EXTRAS = {"gtsam", "mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
-MAY_USE_EXTRAS = ("graph", "simulation", "evaluation", "experiments", "report")
+ORDER = (*GROUND, *LINE, "live", "recordings", "robot", "simulation", "evaluation", "experiments", "report", "cli")
+EXTRAS = {"serial", "gtsam", "mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
+MAY_USE_EXTRAS = ("graph", "robot", "simulation", "evaluation", "experiments", "report")
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

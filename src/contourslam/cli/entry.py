@@ -23,6 +23,8 @@ COMMANDS = {
     "localize": "Follow a robot through a recording in a known map.",
     "locate": "Find a robot in a known map from one scan.",
     "world": "Write a simulated room as a world of Gazebo.",
+    "lidar": "Look at a YDLidar X4 on a serial port.",
+    "record": "Record the scans of a YDLidar X4.",
     "warm-up": "Compile everything before the robot drives.",
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""

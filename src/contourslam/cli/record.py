@@ -1,0 +1,66 @@
+"""``contourslam record``: the scans of a lidar, written as a recording."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from contourslam.cli.console import make_way, note, print_json
+from contourslam.cli.interrupt import Interrupt
+from contourslam.cli.options import Json, Overwrite
+from contourslam.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Record:
+    """Record the scans of a YDLidar X4 until Ctrl-C, or for some seconds.
+
+    The recording is a rosbag2 folder, which ROS 2 and Foxglove read. A standard scan has evenly spaced beams; the
+    lidar's are put on such. Whatever ends the recording, Ctrl-C, a lidar unplugged for good or a full disk, what was
+    recorded until then is whole and kept.
+
+    Example: contourslam record -o out/room --seconds 60
+    """
+
+    output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="DIR")]
+    """Folder of the recording to write."""
+    overwrite: Overwrite = False
+    port: str | None = None
+    """Serial port; found by itself where only one can be the lidar's."""
+    baud: int = 128000
+    """Bits a second."""
+    seconds: float | None = None
+    """How long to record, s; until Ctrl-C where left out."""
+    patience: float = 30.0
+    """How long to wait for a lidar that was unplugged, s."""
+    json: Json = False
+
+    def execute(self, command: str) -> int:
+        """Record, and say what was written."""
+        from tqdm import tqdm
+
+        from contourslam.recordings import RecordingWriter
+        from contourslam.robot.even_beams import even_beams
+        from contourslam.robot.ydlidar_x4 import YdlidarX4
+
+        if self.seconds is not None and not self.seconds > 0.0:
+            raise ConfigError(f"--seconds must be above 0, got {self.seconds}")
+        count, first, last = 0, 0.0, 0.0
+        with Interrupt() as interrupt, YdlidarX4(self.port, baud=self.baud, patience=self.patience) as lidar:
+            make_way(self.output, overwrite=self.overwrite)  # only once there is a lidar to replace it with
+            until = None if self.seconds is None else time.monotonic() + self.seconds
+            stopped = lambda: interrupt.requested or (until is not None and time.monotonic() > until)  # noqa: E731
+            with RecordingWriter(self.output) as writer:
+                scans = lidar.scans(stopped)
+                for scan in tqdm(scans, unit=" scan", delay=1.0, disable=None, leave=False):
+                    writer.write(even_beams(scan))
+                    first, last, count = first if count else scan.stamp, scan.stamp, count + 1
+        seconds = last - first
+        if self.json:
+            print_json({"recording": str(self.output), "scans": count, "seconds": seconds})
+        else:
+            print(f"{self.output}: {count} scans, {seconds:.1f} s")
+            note(f"look into it with: contourslam info {self.output}")
+        return 0

@@ -1,0 +1,162 @@
+import sys
+import threading
+import time
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from x4_device import HEALTH, Device, square_room
+
+from contourslam.errors import MissingExtraError
+from contourslam.robot import serial_port
+from contourslam.robot.lidar_errors import (
+    LidarBaudError,
+    LidarBusyError,
+    LidarFaultError,
+    LidarNoisyError,
+    LidarNotFoundError,
+    LidarPermissionError,
+    LidarPowerError,
+    LidarSilentError,
+    LidarStalledError,
+    LidarUnpluggedError,
+)
+from contourslam.robot.ydlidar_x4 import Health, YdlidarX4
+
+
+def lidar_at(device: Device, *, timeout: float = 0.4, patience: float = 5.0) -> YdlidarX4:
+    return YdlidarX4(str(device.path), timeout=timeout, patience=patience)
+
+
+def test_info_health_scans_and_the_end(device: Device) -> None:
+    with lidar_at(device) as lidar:
+        info = lidar.info()
+        assert (info.model, info.firmware, info.hardware) == (6, "1.10", 1)
+        assert lidar.health() == Health(0, 0)
+        scans = list(islice(lidar.scans(), 4))
+        assert not lidar.motor_line  # a pseudo-terminal has none
+    until = time.monotonic() + 1.0
+    while device.scanning and time.monotonic() < until:
+        time.sleep(0.01)
+    assert device.commands[-1] == 0x65 and not device.scanning
+    assert device.begun is not None
+    for scan in scans:
+        hit = np.isfinite(scan.ranges)
+        assert np.abs(scan.ranges[hit] - square_room(scan.angles[hit])).max() < 0.03
+        late = (scan.stamp - device.begun) % (714 / 5000)
+        assert min(late, 714 / 5000 - late) < 0.03  # of a machine that may be busy
+    assert scans[-1].ranges.size > 650
+
+
+def test_an_unplugged_lidar_is_waited_for(device: Device) -> None:
+    with lidar_at(device) as lidar:
+        scans = lidar.scans()
+        next(scans)
+        device.unplug()
+        back = threading.Timer(0.4, device.plug)
+        back.start()
+        first = next(scans)
+        back.join()
+        assert lidar.reconnections == 1
+        assert next(scans).stamp > first.stamp
+
+
+def test_a_lidar_that_stays_away_is_given_up(device: Device) -> None:
+    with lidar_at(device, patience=0.3) as lidar:
+        scans = lidar.scans()
+        next(scans)
+        device.unplug()
+        with pytest.raises(LidarUnpluggedError, match=r"unplugged and has not come back within .* plug it in"):
+            next(scans)
+
+
+def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device: Device) -> None:
+    with lidar_at(device, timeout=0.2) as lidar:
+        with pytest.raises(LidarPowerError, match="supply dips"):
+            for _ in lidar.scans():
+                device.reboot()
+        assert lidar.restarts == 4
+
+
+def test_silence_is_told(device: Device) -> None:
+    device.deaf = True
+    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(LidarSilentError, match=r"no data within .* power"):
+        next(lidar.scans())
+
+
+def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: Device) -> None:
+    device.silent = True
+    with lidar_at(device, timeout=0.2) as lidar, pytest.raises((LidarSilentError, LidarPowerError, LidarBaudError)):
+        next(lidar.scans())
+
+
+def test_nonsense_is_a_wrong_speed(device: Device) -> None:
+    device.garbage = True
+    with lidar_at(device) as lidar, pytest.raises(LidarBaudError, match="none make sense; the X4 has 128000 baud"):
+        lidar.info()
+
+
+def test_a_head_that_stands_still_is_told(device: Device) -> None:
+    device.stalled = True
+    with lidar_at(device, timeout=0.3) as lidar, pytest.raises(LidarStalledError, match="motor"):
+        next(lidar.scans())
+
+
+def test_a_line_on_which_nothing_passes_any_more_is_told(device: Device) -> None:
+    with lidar_at(device) as lidar:
+        scans = lidar.scans()
+        next(scans)
+        device.damage = 0.7
+        with pytest.raises(LidarNoisyError, match=r"no packet passed its checksum for .* cable"):
+            for _ in scans:
+                pass
+
+
+def test_a_fault_of_the_lidar_is_told(device: Device) -> None:
+    device.health = HEALTH[:7] + bytes([2, 7, 0])
+    with lidar_at(device) as lidar, pytest.raises(LidarFaultError, match="fault 7"):
+        lidar.start()
+
+
+def test_scans_end_when_asked(device: Device) -> None:
+    with lidar_at(device) as lidar:
+        until = time.monotonic() + 0.3
+        assert len(list(lidar.scans(lambda: time.monotonic() > until))) <= 3
+
+
+def test_two_programs_do_not_share_a_lidar(device: Device) -> None:
+    with lidar_at(device), pytest.raises(LidarBusyError, match="another program holds the port"):
+        lidar_at(device)
+
+
+def test_a_port_that_is_not_there_lists_those_that_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(
+        serial_port, "list_ports", lambda: [("/dev/ttyS0", "n/a", False), ("/dev/ttyUSB0", "CP2102", True)]
+    )
+    with pytest.raises(LidarNotFoundError, match=r"there are: /dev/ttyS0, /dev/ttyUSB0 \(CP2102\)"):
+        YdlidarX4(str(tmp_path / "none"))
+    assert serial_port.find_port() == "/dev/ttyUSB0"
+    monkeypatch.setattr(serial_port, "list_ports", lambda: [("a", "", False), ("b", "", False)])
+    with pytest.raises(LidarNotFoundError, match="choose one with --port"):
+        serial_port.find_port()
+    monkeypatch.setattr(serial_port, "list_ports", list)
+    with pytest.raises(LidarNotFoundError, match="no serial port at all"):
+        serial_port.find_port()
+
+
+def test_without_permission_the_group_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    import serial
+
+    def refuse(self: object) -> None:
+        raise serial.SerialException(13, "no")
+
+    monkeypatch.setattr(serial.Serial, "open", refuse)
+    with pytest.raises(LidarPermissionError, match=r"sudo usermod -aG \w+ \$USER"):
+        serial_port.open_port(str(tmp_path), 128000)
+
+
+def test_without_pyserial_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(MissingExtraError, match=r"contourslam\[robot\]"):
+        YdlidarX4("/dev/null")
