@@ -14,10 +14,10 @@ from contourslam.landmarks import trace
 from contourslam.localization.fixed_map import make_fixed_map
 from contourslam.localization.known_map import KnownMap
 from contourslam.localization.locate import Locator
-from contourslam.localization.lookout import STILL, Finder, Lookout
+from contourslam.localization.lookout import STILL, Agreed, Finder, Lookout
 from contourslam.localization.motion import Motion, Step
 from contourslam.localization.sighted import NO_SIGHT, Sighted
-from contourslam.localization.trust import LEAST_USUAL, Trust
+from contourslam.localization.trust import Trust
 from contourslam.maps import SavedMap
 from contourslam.matching.align import POINT_SIGMA, Alignment, align
 from contourslam.matching.certainty import hold
@@ -34,7 +34,12 @@ LEAST_PART = 0.45  # what fits of a scan shows where the robot is if it is this 
 TRUE = 0.02  # ... and what was expected holds it where it wants to be itself, within this, m
 DOUBT = np.diag([0.05**2, 0.05**2, math.radians(1.5) ** 2])  # that each poor scan adds to the pose
 RESCUES, RESCUE_EVERY = 4, 8  # poor scans at which the neighbourhood is searched: the first ones, then every so many
-BETTER = 0.1  # overlap by which a scan must fit better elsewhere than where the robot is thought to be
+# Overlap that a scan must have where looks agree that it is: of one in a corridor that only looks like the right one,
+# half fits, and it takes some way to tell.
+FITS = {"sure": 0.65, "steady": 0.55}
+# Overlap by which a scan must fit better elsewhere than where the robot is thought to be: where looks are sure, and
+# where they are a hint only.
+BETTER, MUCH_BETTER = 0.1, 0.25
 CHECK_LOOKS = 3  # looks that a second opinion takes
 # A robot that is lost finds back into the map by itself while it is known this well where it is; else it must look.
 STRAYED, STRAYED_ANGLE = 1.0, math.radians(30.0)
@@ -269,27 +274,31 @@ class Localizer:
     def _look(self, oriented: Floats, blur: float) -> None:
         """Where there is doubt, ask where in the whole map the robot is, and believe looks that agree."""
         trust = self._trust
-        if trust.check_due:
-            trust.weak_for, self._checking = 0.0, True
+        if trust.wants_check():
+            self._checking = True
             self._look_out(oriented)
         if self._lookout is None:
             return
-        pose = self._lookout.look() if trust.poor or self._checking else None
+        agreed = self._lookout.look() if trust.poor or self._checking else None
         self._lap("search")
-        if pose is not None and self._fits_better(pose, oriented):
-            found = align(oriented, self._map.cells, pose, LOOSE)
+        if agreed is not None and self._fits_better(agreed, oriented):
+            found = align(oriented, self._map.cells, agreed.pose, LOOSE)
             self._pose, self._covariance, self._placed = found.pose, invert(LOOSE), True
             self._take(found, oriented, blur)
             trust.found()
-        elif trust.poor == 0 and (pose is not None or not self._checking or self._lookout.looks >= CHECK_LOOKS):
+        elif trust.poor == 0 and (agreed is not None or not self._checking or self._lookout.looks >= CHECK_LOOKS):
             self._lookout, self._checking = None, False
 
-    def _fits_better(self, pose: Floats, oriented: Floats) -> bool:
+    def _fits_better(self, agreed: Agreed, oriented: Floats) -> bool:
         """Whether the scan fits at a pose, and clearly better than where the robot is thought to be, if it is."""
-        overlap = align(oriented, self._map.cells, pose, LOOSE).overlap
-        if overlap < POOR * LEAST_USUAL:
+        hint = agreed.word == "hint"
+        there = align(oriented, self._map.cells, agreed.pose, LOOSE).overlap
+        if there < (self._trust.enough if hint else FITS[agreed.word]):
             return False
-        return not self.localized or overlap > BETTER + align(oriented, self._map.cells, self._pose, LOOSE).overlap
+        if not self.localized and not hint:
+            return True
+        here = align(oriented, self._map.cells, self._pose, LOOSE).overlap
+        return self._placed and there > here + (MUCH_BETTER if hint else BETTER)
 
     def _take(self, found: Alignment, oriented: Floats, blur: float, weight: float = 1.0) -> None:
         """Take over the pose of an alignment, with what the contours know of it."""

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -23,11 +23,15 @@ BROKEN = 0.6  # contours that fit those before worse than this say that the robo
 EAGER = 6  # looks that are taken in quick succession; later ones keep apart by more
 SOON, LATER = 0.25, 1.0  # s between the first looks, and between later ones
 LIKELY = 0.7  # probability by which one of two looks is sure enough; a single one had to be surer
+HINT, ALONE = (
+    0.3,
+    0.2,
+)  # probability of a look that is a hint, and of a second place beside it at most, as a part of that
 MOST_LOOKS = 8  # that are remembered
 # Looks none of which is sure must be so many, along so much of way (m) ...
-STEADY_LOOKS, STEADY_WAY = 5, 2.0
+STEADY_LOOKS, STEADY_WAY = 5, 3.0
 # ... and none may find it less probable than this that the robot is there, or see a second place half as probable.
-DOUBTED, CLEAR = 0.01, 0.5
+DOUBTED, CLEAR = 0.1, 0.5
 STILL = np.zeros(3), 1e-10 * np.eye(3)
 
 
@@ -38,12 +42,29 @@ class _Look:
     drive: Floats
     pose: Floats
     sure: bool
+    hint: bool
     clear: bool
 
     def agrees(self, later: "_Look") -> bool:
         """Whether a later look finds the robot where it must have come to since."""
         off = between_one(compose_one(self.pose, between_one(self.drive, later.drive)), later.pose)
         return math.hypot(off[0], off[1]) < AGREE and abs(float(off[2])) < AGREE_ANGLE
+
+
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """A pose in the map that looks agree on.
+
+    Attributes
+    ----------
+    pose : ndarray, shape (3,)
+        m, m, rad.
+    word : {"hint", "sure", "steady"}
+        Two looks that were not sure, two that were, or all of them along some way.
+    """
+
+    pose: Floats
+    word: Literal["hint", "sure", "steady"]
 
 
 class Finder(Protocol):
@@ -111,11 +132,12 @@ class Lookout:
             return increment, noise
         return step.increment, step.covariance
 
-    def look(self) -> Floats | None:
+    def look(self) -> Agreed | None:
         """Look in the whole map, where a look is due; gives the pose in it where looks agree on one.
 
         Two looks are enough that are both sure of the pose. Where much has changed none is, for the robot might as well
-        be in another building: then all looks along some way must agree, and none see a second place like it.
+        be in another building: then all looks along some way must agree, and none see a second place like it. Two looks
+        that are less sure, but see no second place, give a hint.
         """
         if self._next_look > 0.0:
             return None
@@ -127,13 +149,18 @@ class Lookout:
             return None
         rival = found.runners_up[0].probability if found.runners_up else 0.0
         clear = found.probability > DOUBTED and rival < CLEAR * found.probability
-        look = _Look(self.pose, found.pose, found.confident or (clear and found.probability > LIKELY), clear)
+        sure = found.confident or (clear and found.probability > LIKELY)
+        hint = sure or (found.probability > HINT and rival < ALONE * found.probability)
+        look = _Look(self.pose, found.pose, sure, hint, clear)
         agreeing = [other for other in self._seen if other.agrees(look)]
-        sure = look.sure and any(other.sure for other in agreeing)
         if len(agreeing) < len(self._seen):
-            self._seen = deque([other for other in agreeing if other.sure], MOST_LOOKS)
+            self._seen = deque([other for other in agreeing if other.hint], MOST_LOOKS)
         self._seen.append(look)
-        return look.pose if sure or self._steady() else None
+        if self._steady():
+            return Agreed(look.pose, "steady")
+        if sure and any(other.sure for other in agreeing):
+            return Agreed(look.pose, "sure")
+        return Agreed(look.pose, "hint") if hint and any(other.hint for other in agreeing) else None
 
     def _steady(self) -> bool:
         """Whether all looks along some way say the same."""

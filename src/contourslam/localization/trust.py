@@ -7,7 +7,7 @@ LEAST_USUAL = 0.6  # so much of it at least, however much has changed
 LEARN = 0.02  # weight of the newest scan in what is usual
 LOST = 8  # poor scans in a row, after which the map is no longer believed
 FOUND = 3  # good scans in a row that end all doubt
-CHECK_EVERY = 5.0  # s of scans that fit in part only, after which a second opinion is asked for
+CHECK_EVERY = 5.0  # s; where a scan fits in part only, a second opinion is asked for, if the last one is this long ago
 
 
 class Trust:
@@ -19,13 +19,13 @@ class Trust:
         Whether the pose is believed.
     poor : int
         Poor scans since all was well; 0 where it is.
-    weak_for : float
-        How long scans have fitted in part only, s, since a second opinion was asked for.
+    weak : bool
+        Whether the last scan fitted in part only.
     """
 
     def __init__(self) -> None:
-        self.localized, self.poor, self.weak_for = False, LOST, 0.0
-        self._usual, self._good = USUAL, 0
+        self.localized, self.poor, self.weak = False, LOST, False
+        self._usual, self._good, self._unchecked = USUAL, 0, 0.0
 
     @property
     def enough(self) -> float:
@@ -39,7 +39,7 @@ class Trust:
     def count_poor(self) -> None:
         """Count a scan that fits badly."""
         self.poor += 1
-        self._good = 0
+        self._good, self.weak = 0, False
         self.localized = self.localized and self.poor < LOST
 
     def count_good(self, overlap: float, elapsed: float) -> None:
@@ -49,17 +49,18 @@ class Trust:
             self.localized, self.poor = True, 0
         if not self.localized:
             return
-        if overlap >= self.enough:
+        self._unchecked += elapsed
+        self.weak = overlap < self.enough
+        if not self.weak:  # what has changed stays unusual
             self._usual += LEARN * (overlap - self._usual)
-            self.weak_for = 0.0
-        else:  # what has changed stays unusual, so that the doubt does
-            self.weak_for += elapsed
 
     def found(self) -> None:
         """Begin anew where the robot was found."""
-        self.localized, self.poor, self._good, self.weak_for = True, 1, 0, 0.0
+        self.localized, self.poor, self._good, self.weak, self._unchecked = True, 1, 0, False, 0.0
 
-    @property
-    def check_due(self) -> bool:
-        """Whether a second opinion is to be asked for."""
-        return self.weak_for > CHECK_EVERY
+    def wants_check(self) -> bool:
+        """Whether a second opinion is to be asked for; having said so, not again for a while."""
+        if not self.weak or self._unchecked < CHECK_EVERY:
+            return False
+        self._unchecked = 0.0
+        return True
