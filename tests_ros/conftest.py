@@ -9,19 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from observer import Observer
+from player import Plan
+
+from contourslam.live.rehearsal import stages
+from contourslam.scan import LaserScan, Odometry
+from contourslam.simulation.simulate import SimulatedRun
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "ros2" / "contourslam_ros")]
-# Before rclpy is loaded, and for the processes: nobody else's nodes are heard. Ids up to 101 are safe on every system.
+# Nobody else's nodes are heard, and the processes find what the tests do. Ids up to 101 are safe on every system.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(40 + os.getpid() % 60)
-os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])
-
-from observer import Observer  # noqa: E402  # the path and the environment come first
-from player import Plan  # noqa: E402
-
-from contourslam.scan import LaserScan, Odometry  # noqa: E402
-from contourslam.simulation.simulate import SimulatedRun  # noqa: E402
+os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parent / "ros2" / "contourslam_ros")])
 
 SECONDS = 36.0
 
@@ -97,10 +96,19 @@ class Processes:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        self._running.clear()
+
+
+@pytest.fixture(scope="session")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """All kernels are in Numba's cache: else the nodes that start together would each compile them, for minutes."""
+    work = dict(stages(tmp_path_factory.mktemp("compiled")))
+    for name in ("mapping, graph", "continuing a map, graph", "localising"):
+        work[name]()
 
 
 @pytest.fixture(scope="module")
-def processes(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+def processes(compiled: None, recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
     made = Processes(recording, tmp_path_factory.mktemp("processes"))
     yield made
     made.end()
@@ -112,7 +120,7 @@ def observe(ros: None) -> Iterator[Callable[[str], Observer]]:
     observers: list[Observer] = []
 
     def begin(namespace: str = "") -> Observer:
-        observers.append(Observer(namespace, f"observer{len(observers)}"))
+        observers.append(Observer(namespace, f"observer{len(observers)}", observers[0] if observers else None))
         return observers[-1]
 
     yield begin

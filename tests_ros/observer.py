@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from contourslam_msgs.msg import LandmarkMap
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
@@ -36,11 +35,12 @@ class Observer:
         When it came, and what.
     """
 
-    def __init__(self, namespace: str, name: str) -> None:
+    def __init__(self, namespace: str, name: str, common: "Observer | None" = None) -> None:
         self.node = rclpy.create_node(name, namespace=namespace)
         self.poses: list[tuple[float, float, np.ndarray, np.ndarray]] = []
-        self.transforms: list[TransformStamped] = []
-        self.told: list[tuple[float, DiagnosticStatus]] = []
+        # Of all robots, so that one node is enough to listen to them.
+        self.transforms: list[TransformStamped] = [] if common is None else common.transforms
+        self.told: list[tuple[float, DiagnosticStatus]] = [] if common is None else common.told
         self.landmarks: LandmarkMap | None = None
         self.markers: MarkerArray | None = None
         self.grid: OccupancyGrid | None = None
@@ -50,20 +50,23 @@ class Observer:
         listen(LandmarkMap, "landmarks", lambda message: setattr(self, "landmarks", message), LATCHED)
         listen(MarkerArray, "markers", lambda message: setattr(self, "markers", message), LATCHED)
         listen(OccupancyGrid, "map", lambda message: setattr(self, "grid", message), LATCHED)
-        listen(TFMessage, "/tf", lambda message: self.transforms.extend(message.transforms), 1000)
-        listen(DiagnosticArray, "/diagnostics", self._on_told, 100)
+        if common is None:
+            listen(TFMessage, "/tf", lambda message: self.transforms.extend(message.transforms), 1000)
+            listen(DiagnosticArray, "/diagnostics", self._on_told, 100)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
+        self._ended = False
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
 
     def _spin(self) -> None:
-        with suppress(ExternalShutdownException):
-            self._executor.spin()
+        while not self._ended:
+            self._executor.spin_once(timeout_sec=0.2)
 
     def close(self) -> None:
-        self._executor.shutdown()
+        self._ended = True
         self._thread.join(5.0)
+        self._executor.shutdown()
         self.node.destroy_node()
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -81,12 +84,20 @@ class Observer:
 
     def latest(self, name: str) -> DiagnosticStatus | None:
         """The last diagnostic whose name ends so."""
-        return next((status for _, status in reversed(self.told) if status.name.endswith(name)), None)
+        return next((status for _, status in reversed(self._mine()) if status.name.endswith(name)), None)
+
+    def _mine(self) -> list[tuple[float, DiagnosticStatus]]:
+        within = self.node.get_namespace().rstrip("/") + "/"
+        return [(when, status) for when, status in list(self.told) if status.name.startswith(within)]
 
     def said(self, *words: str, since: float = 0.0) -> bool:
         """Whether a diagnostic that is no OK holds all words."""
-        texts = [s.message for when, s in list(self.told) if when >= since and s.level != DiagnosticStatus.OK]
+        texts = [s.message for when, s in self._mine() if when >= since and s.level != DiagnosticStatus.OK]
         return any(all(word in text for word in words) for text in texts)
+
+    def faults(self) -> list[str]:
+        """All that was ever found wrong, once each."""
+        return sorted({f"{s.name}: {s.message}" for _, s in self._mine() if s.level != DiagnosticStatus.OK})
 
     def call(self, kind: Any, name: str, **fields: object) -> Any:
         """Call a service of the node."""

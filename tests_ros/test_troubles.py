@@ -43,17 +43,23 @@ class Seen:
     errors: np.ndarray
     sent: float
 
+    def worst(self, after: float) -> float:
+        """Largest error of the poses after a time, m."""
+        return float(self.errors[self.stamps > after].max())
+
 
 @pytest.fixture(scope="module")
 def seen(drive: SimulatedRun, processes: Processes, observe: Callable[[str], Observer]) -> dict[str, Seen]:
-    observers = {name: observe(name) for name in TROUBLES}
-    for name, trouble in TROUBLES.items():
-        processes.start("slam", namespace=name, frame_prefix=f"{name}/", **trouble.parameters)
-    players = [
-        processes.play(**{"namespace": name, "prefix": f"{name}/", "pieces": [[0.0, LENGTH]], **trouble.plan})
-        for name, trouble in TROUBLES.items()
-    ]
-    assert [player.wait(240.0) for player in players] == [0] * len(players)
+    names = list(TROUBLES)
+    observers: dict[str, Observer] = {}
+    for together in (names[:3], names[3:]):  # as many as two cores bear
+        observers |= {name: observe(name) for name in together}
+        for name in together:
+            processes.start("slam", namespace=name, frame_prefix=f"{name}/", **TROUBLES[name].parameters)
+        plans = {name: {"pieces": [[0.0, LENGTH]], **TROUBLES[name].plan} for name in together}
+        players = [processes.play(namespace=name, prefix=f"{name}/", **plan) for name, plan in plans.items()]
+        assert [player.wait(240.0) for player in players] == [0] * len(players)
+        processes.end()
     found = {}
     for name, observer in observers.items():
         stamps, poses = observer.trajectory()
@@ -67,40 +73,40 @@ def test_a_node_that_starts_before_the_odometry_says_so_and_is_right(seen: dict[
     early = seen["early"]
     assert early.observer.said("no odometry has come on /early/odom")
     assert len(early.stamps) == early.sent
-    assert early.errors[early.stamps > 6.0 + RIGHT_AGAIN].max() < CLOSE
+    assert early.worst(6.0 + RIGHT_AGAIN) < CLOSE, early.observer.faults()
 
 
 def test_a_node_that_starts_after_the_odometry_is_right_from_the_first_scan(seen: dict[str, Seen]) -> None:
     late = seen["late"]
     assert not late.observer.said("no odometry has come on /late/odom")
     assert len(late.stamps) == late.sent
-    assert late.errors.max() < CLOSE
+    assert late.errors.max() < CLOSE, late.observer.faults()
 
 
 def test_a_robot_without_odometry_is_mapped_and_told_so(seen: dict[str, Seen]) -> None:
     without = seen["without"]
     assert without.observer.said("no odometry has come on /without/odom")
-    assert without.errors.max() < CLOSE
+    assert without.errors.max() < CLOSE, without.observer.faults()
 
 
 def test_odometry_that_stops_is_named_and_the_scans_carry_the_pose(seen: dict[str, Seen]) -> None:
     stopped = seen["wheels_stop"]
     assert stopped.observer.said("no odometry for", "/wheels_stop/odom")
     assert len(stopped.stamps) == stopped.sent
-    assert stopped.errors[stopped.stamps > GAP[1] + RIGHT_AGAIN].max() < CLOSE
+    assert stopped.worst(GAP[1] + RIGHT_AGAIN) < CLOSE, stopped.observer.faults()
 
 
 def test_scans_that_stop_are_named_and_the_pose_is_right_after(seen: dict[str, Seen]) -> None:
     stopped = seen["scans_stop"]
     assert stopped.observer.said("no scan for", "/scans_stop/scan")
-    assert stopped.errors[stopped.stamps > GAP[1] + RIGHT_AGAIN].max() < CLOSE
+    assert stopped.worst(GAP[1] + RIGHT_AGAIN) < CLOSE, stopped.observer.faults()
 
 
 def test_time_that_runs_back_is_named_and_the_drive_begun_anew(seen: dict[str, Seen]) -> None:
     back = seen["time_runs_back"]
-    assert back.observer.said("time ran back by")
+    assert back.observer.said("time ran back by"), back.observer.faults()
     (at,) = np.flatnonzero(np.diff(back.stamps) < 0.0)
     again = back.stamps[at + 1 :]
     assert again[0] < 1.0
-    assert back.errors[at + 1 :][again > RIGHT_AGAIN].max() < CLOSE
+    assert back.errors[at + 1 :][again > RIGHT_AGAIN].max() < CLOSE, back.observer.faults()
     assert len(back.stamps) >= back.sent - 5  # one may be a stray, and some pass until the robot is found

@@ -10,6 +10,7 @@ from geometry_msgs.msg import TransformStamped
 from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 from tf2_msgs.msg import TFMessage
 
 from contourslam.recordings.ros_messages import frame_name
@@ -33,11 +34,19 @@ class Frames:
     def __init__(self, on_moved: Callable[[TransformStamped], None] = lambda stamped: None) -> None:
         self._parents: dict[str, tuple[str, Floats]] = {}
         self._on_moved = on_moved
+        self._moving: tuple[Node, Subscription] | None = None
 
     def listen(self, node: Node) -> None:
         """Subscribe a node to both topics."""
         node.create_subscription(TFMessage, "/tf_static", lambda message: self.add(message.transforms), STATIC)
-        node.create_subscription(TFMessage, "/tf", self._moved, SENT)
+        self._moving = node, node.create_subscription(TFMessage, "/tf", self._moved, SENT)
+
+    def stand_still(self) -> None:
+        """Listen no longer to /tf, on which there are some hundred transforms a second."""
+        if self._moving is not None:
+            node, subscription = self._moving
+            node.destroy_subscription(subscription)
+            self._moving = None
 
     def _moved(self, message: TFMessage) -> None:
         self.add(message.transforms)

@@ -1,7 +1,9 @@
 """What mapping and localisation have in common: messages go into a session, its results come out as messages."""
 
+import tempfile
 import time
 from collections import OrderedDict, deque
+from pathlib import Path
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -15,6 +17,7 @@ from contourslam.errors import ContourslamError
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.live.events import Source
 from contourslam.live.processed import Processed
+from contourslam.live.rehearsal import SHORT, stages
 from contourslam.live.session import Session
 from contourslam.live.warming import warm_up
 from contourslam.live.worker import Worker
@@ -48,9 +51,13 @@ class LiveNode(Node):
 
     Attributes
     ----------
+    rehearsed : tuple of str
+        Stages of :mod:`contourslam.live.rehearsal` that the node may come to.
     failure : BaseException or None
         Why the node cannot go on.
     """
+
+    rehearsed: tuple[str, ...] = ()
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -72,8 +79,12 @@ class LiveNode(Node):
         raise NotImplementedError
 
     def warm_up(self) -> None:
-        """Have everything compiled before the first scan comes."""
-        warm_up(self.settings.core)
+        """Have everything that the node may do done once before the first scan comes, so that it is compiled."""
+        with tempfile.TemporaryDirectory() as folder:
+            work = dict(stages(Path(folder)))
+            for name in self.rehearsed:
+                work[name]()
+        warm_up(self.settings.core, laps=SHORT)  # with the detector and the filter that were chosen
 
     @property
     def topics(self) -> dict[Source, str]:

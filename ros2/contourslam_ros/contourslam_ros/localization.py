@@ -1,7 +1,6 @@
 """Node ``localization``: tells the robot where it is in a map that is kept as it is."""
 
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from contourslam.errors import ConfigError, ContourslamError
-from contourslam.live.rehearsal import stages
 from contourslam.live.session import Session
 from contourslam.live.start import localization
 from contourslam.recordings.ros_messages import POSE_COVARIANCE, odometry_from
@@ -19,6 +17,8 @@ from contourslam_ros.running import run
 
 class Localization(LiveNode):
     """The robot's pose in a known map, looked for everywhere until it is found."""
+
+    rehearsed = "mapping, graph", "localising"  # the latter needs the map of the former
 
     def __init__(self) -> None:
         super().__init__("localization")
@@ -36,13 +36,6 @@ class Localization(LiveNode):
             topics=self.topics,
             expects_odometry=self.config.odometry != "none",
         )
-
-    def warm_up(self) -> None:
-        """Map a made-up building and localise in it, so that all that takes is compiled."""
-        with tempfile.TemporaryDirectory() as folder:
-            work = dict(stages(Path(folder)))
-            next(iter(work.values()))()
-            work["localising"]()
 
     def start(self) -> None:
         """Publish and subscribe; RViz's "2D Pose Estimate" gives a first guess."""

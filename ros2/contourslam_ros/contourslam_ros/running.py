@@ -1,12 +1,15 @@
 """The life of a node: warm, running, stopped in order, and one line where it cannot go on."""
 
 import gc
+import signal
 import sys
+import threading
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
+from rclpy.signals import SignalHandlerOptions
 
 from contourslam.errors import ContourslamError
 from contourslam_ros.live_node import LiveNode
@@ -14,21 +17,25 @@ from contourslam_ros.live_node import LiveNode
 
 def run(make: Callable[[], LiveNode]) -> int:
     """Run a node; give the exit code: 0 where it was told to stop, 1 where it could not go on."""
-    rclpy.init(args=sys.argv)
+    # No exception in the midst of anything: what is being done is done, the map is saved, then the node ends.
+    told = threading.Event()
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, lambda number, frame: told.set())
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
         node = make()
-        node.get_logger().info("warming up, which takes a minute when it is the first time on this machine")
+        node.get_logger().info("warming up, which takes minutes when it is the first time on this machine")
         node.warm_up()
         gc.freeze()  # what stays is not looked through again: that would hold up a scan for a tenth of a second
         node.start()
         node.get_logger().info(f"ready: waiting for {' and '.join(node.topics.values())}")
-        while rclpy.ok() and node.failure is None:
-            rclpy.spin_once(node, timeout_sec=0.5)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while not told.is_set() and node.failure is None:
+            executor.spin_once(timeout_sec=0.2)
         if node.failure is not None:
             raise node.failure
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     except ContourslamError as error:
         get_logger("contourslam").fatal(str(error))
         return 1
@@ -36,5 +43,5 @@ def run(make: Callable[[], LiveNode]) -> int:
         if node is not None:
             node.stop()
             node.destroy_node()
-        rclpy.try_shutdown()
+        rclpy.shutdown()
     return 0

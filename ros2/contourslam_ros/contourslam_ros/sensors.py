@@ -22,8 +22,8 @@ from contourslam.scan.mounting import Mounting
 from contourslam_ros.frames import Frames
 from contourslam_ros.settings import Settings
 
-# As the sensors' own profile, but deep enough for what comes while the machine is busy for a second.
-SENSOR = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+# As the sensors' own profile, but deep enough for what comes while the machine is busy for some seconds.
+SENSOR = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class Sensors:
@@ -105,6 +105,8 @@ class Sensors:
                 "lidar.mount_yaw"
             )
             return
+        if self._config.odometry != "tf":
+            self._frames.stand_still()
         x, y, yaw = self.mounting.pose
         where = f"{lidar} sits at x {x:.3f} m, y {y:.3f} m, {np.degrees(yaw):.1f} degrees on {self._base}"
         self._node.get_logger().info(where + (", upside down" if self.mounting.upside_down else ""))

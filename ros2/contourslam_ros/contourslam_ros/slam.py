@@ -17,6 +17,8 @@ class Slam(LiveNode):
 
     def __init__(self) -> None:
         super().__init__("slam")
+        if self.settings.core.back_end == "graph":
+            self.rehearsed = "mapping, graph", "continuing a map, graph"
 
     def begin(self, mount: np.ndarray) -> Session:
         """Map anew, or continue the map that is there."""
