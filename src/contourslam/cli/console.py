@@ -117,9 +117,9 @@ def make_way(path: Path, *, overwrite: bool) -> None:
     if not path.exists():
         return
     if not overwrite:
-        raise ResultError(f"{path} is there already; choose another --output, or replace it with --overwrite")
+        raise ResultError(f"{path} is there already; choose another name, or replace it with --overwrite")
     if not path.is_dir():
         return  # replaced as a whole once the new one is written
     if not (path / "metadata.yaml").is_file():
-        raise ResultError(f"{path} is a folder, and no recording; choose another --output")
+        raise ResultError(f"{path} is a folder, and no recording; choose another name")
     shutil.rmtree(path)
