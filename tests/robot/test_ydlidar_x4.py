@@ -87,8 +87,9 @@ def test_silence_is_told(device: Device) -> None:
 
 def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: Device) -> None:
     device.silent = True
-    with lidar_at(device, timeout=0.2) as lidar, pytest.raises((LidarSilentError, LidarPowerError, LidarBaudError)):
+    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(LidarSilentError, match="no data"):
         next(lidar.scans())
+    assert device.commands.count(0x60) == 4
 
 
 def test_nonsense_is_a_wrong_speed(device: Device) -> None:
@@ -104,11 +105,21 @@ def test_a_head_that_stands_still_is_told(device: Device) -> None:
 
 
 def test_a_line_on_which_nothing_passes_any_more_is_told(device: Device) -> None:
-    with lidar_at(device) as lidar:
+    with lidar_at(device, timeout=0.2) as lidar:
         scans = lidar.scans()
         next(scans)
         device.damage = 0.7
-        with pytest.raises(LidarNoisyError, match=r"no packet passed its checksum for .* cable"):
+        with pytest.raises(LidarNoisyError, match=r"\d% of the last packets fail .* cable"):
+            for _ in scans:
+                pass
+
+
+def test_a_line_that_lets_hardly_anything_pass_is_told_with_the_rate(device: Device) -> None:
+    with lidar_at(device, timeout=0.15) as lidar:
+        scans = lidar.scans()
+        next(scans)
+        device.damage = 0.12
+        with pytest.raises(LidarNoisyError, match=r"\d% of the last packets fail"):
             for _ in scans:
                 pass
 

@@ -90,6 +90,11 @@ class TurnAssembler:
         self._forget()
 
     @property
+    def failing(self) -> float:
+        """Share of the last 200 packets or so that failed."""
+        return self._failures
+
+    @property
     def noisy(self) -> bool:
         """Whether packets fail, so that the checksum alone is not enough."""
         return self._failures > _CLEAN

@@ -13,7 +13,6 @@ from contourslam.robot.lidar_errors import (
     LidarError,
     LidarFaultError,
     LidarNoisyError,
-    LidarNotFoundError,
     LidarPowerError,
     LidarSilentError,
     LidarStalledError,
@@ -26,6 +25,7 @@ from contourslam.scan import LaserScan
 BAUD = 128000
 SCAN, STOP, INFO, HEALTH, RESTART = (bytes([0xA5, code]) for code in (0x60, 0x65, 0x90, 0x91, 0x80))
 _REPLY = b"\xa5\x5a"
+_MOST_TRIES = 3  # a lidar that lost its power needs a second or two until it hears
 _BATCH = 0.015  # s of bytes read at once: fewer wake-ups, and the clock knows that they are late
 _MOST_RESTARTS, _RESTART_SPAN = 3, 60.0  # more than so many in so many seconds is a supply that does not hold
 
@@ -88,6 +88,8 @@ class YdlidarX4:
         Counters of packets, failures and turns.
     restarts, reconnections : int
         How often the lidar had to be told again to scan, and the port was opened anew.
+    unheard : int
+        Of these commands, how many in a row brought no packet.
     motor_line : bool
         Whether the port has the line that switches the motor.
 
@@ -111,6 +113,7 @@ class YdlidarX4:
         self._wanted, self._baud, self._timeout, self._patience, self._clock = port, baud, timeout, patience, clock
         self.turns = TurnAssembler()
         self.restarts = self.reconnections = 0
+        self.unheard = 0
         self.motor_line = True
         self._restarted: deque[float] = deque(maxlen=_MOST_RESTARTS + 1)
         self.name = ""
@@ -241,6 +244,7 @@ class YdlidarX4:
     def told_again(self) -> None:
         """Note that the lidar has to be told again to scan."""
         self.restarts += 1
+        self.unheard += 1
         now = time.monotonic()
         while self._restarted and now - self._restarted[0] > _RESTART_SPAN:
             self._restarted.popleft()
@@ -257,7 +261,7 @@ class YdlidarX4:
                 self.start()
                 self.reconnections += 1
                 return True
-            except (LidarNotFoundError, LidarUnpluggedError, LidarSilentError, LidarBaudError) as error:
+            except LidarError as error:  # the rights to a new port come a moment after it, and a lidar has to boot
                 if time.monotonic() + pause > until:
                     raise LidarUnpluggedError(
                         f"{self.name}: the lidar was unplugged and has not come back within {self._patience:.0f} s; "
@@ -341,11 +345,11 @@ class _Watch:
     def __init__(self, lidar: YdlidarX4) -> None:
         self._lidar, self._parser = lidar, lidar.turns.parser
         self._begun = self._heard = self._sensible = self._turned = time.monotonic()
-        self._good, self._bad, self._turns, self._received = self._counters()
+        self._good, self._turns, self._received = self._counters()
         self._ever = False
 
-    def _counters(self) -> tuple[int, int, int, int]:
-        return self._parser.good, self._parser.bad, self._lidar.turns.turns, self._parser.received
+    def _counters(self) -> tuple[int, int, int]:
+        return self._parser.good, self._lidar.turns.turns, self._parser.received
 
     def saw(self, count: int) -> None:
         if count:
@@ -357,29 +361,35 @@ class _Watch:
         # After the first command a motor may need time; a stream that breaks off has no such excuse.
         if now - self._heard < (0.5 if self._ever else 1.0) * self._lidar.timeout:
             return True
-        if not self._ever and self._lidar.restarts:
+        if self._lidar.unheard >= _MOST_TRIES:
             raise self._lidar.no_answer(0)
         self._lidar.told_again()
         return False
 
     def judge(self) -> None:
         """Raise what is wrong."""
-        now, before = time.monotonic(), (self._good, self._turns)
-        good, bad, turns, received = self._counters()
+        now = time.monotonic()
+        good, turns, received = self._counters()
         lidar = self._lidar
-        if good > before[0]:
+        if good > self._good:
             self._good, self._sensible, self._ever = good, now, True
-        elif now - self._sensible > lidar.timeout and received > self._received:
+            lidar.unheard = 0
+        elif now - self._sensible > (5.0 if self._ever else 1.0) * lidar.timeout and received > self._received:
             if not self._parser.good:
                 raise lidar.no_answer(received - self._received)
-            raise LidarNoisyError(
-                f"{lidar.name}: no packet passed its checksum for {lidar.timeout:g} s ({bad} failed, "
-                f"{self._parser.good} were good before); check the cable and its distance from the motors"
-            )
-        if turns > before[1]:
+            raise self._noisy(now - self._sensible)
+        if turns > self._turns:
             self._turns, self._turned = turns, now
-        elif now - self._turned > 3.0 * lidar.timeout and good - before[0] >= 0 and not lidar.turns.noisy:
+        elif lidar.turns.noisy and now - self._turned > 10.0 * lidar.timeout:
+            raise self._noisy(now - self._turned)
+        elif not lidar.turns.noisy and now - self._turned > 3.0 * lidar.timeout:
             raise LidarStalledError(
                 f"{lidar.name}: samples come but no turn ends: the motor stands or is too slow; see that nothing holds "
                 "the head, and that the supply gives 5 V and 1 A"
             )
+
+    def _noisy(self, seconds: float) -> LidarNoisyError:
+        return LidarNoisyError(
+            f"{self._lidar.name}: no turn was measured for {seconds:.1f} s, for {self._lidar.turns.failing:.0%} of the "
+            "last packets fail their checksum; check the cable and its distance from the motors"
+        )
