@@ -43,14 +43,14 @@ def test_lidar_says_what_it_sees(device: Device, capsys: pytest.CaptureFixture[s
     assert found["noise"] < 0.002
     assert found["checksum_rate"] > 0.9
     assert (found["model"], found["motor_line"], found["reconnections"]) == (6, False, 0)
-    assert main(["lidar", "--port", str(device.path), "--seconds", "0.6"]) == 0
+    assert main(["lidar", "--port", str(device.path), "--seconds", "0.4"]) == 0
     text = capsys.readouterr().out
     assert "X4, firmware 1.10" in text and "a second" in text and "\x1b" not in text
 
 
 def test_on_a_terminal_lidar_draws_the_room(device: Device) -> None:
     master, slave = pty.openpty()
-    words = [sys.executable, "-m", "contourslam", "lidar", "--port", str(device.path), "--seconds", "1.2"]
+    words = [sys.executable, "-m", "contourslam", "lidar", "--port", str(device.path), "--seconds", "0.9"]
     environment = os.environ | {"COLUMNS": "80", "LINES": "24"}
     process = subprocess.Popen(words, stdout=slave, stderr=subprocess.DEVNULL, env=environment)
     os.close(slave)
@@ -71,7 +71,7 @@ def test_record_writes_a_recording_of_the_room(
     device: Device, tmp_path: Path, capsys: pytest.CaptureFixture[str], failure: Failure
 ) -> None:
     bag = tmp_path / "bag"
-    assert main(["record", "-o", str(bag), "--port", str(device.path), "--seconds", "1", "--json"]) == 0
+    assert main(["record", "-o", str(bag), "--port", str(device.path), "--seconds", "0.8", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     scans = scans_of(bag)
     assert said["scans"] == len(scans) >= 3
@@ -90,12 +90,12 @@ def test_ctrl_c_and_a_lidar_that_goes_leave_a_whole_recording(device: Device, tm
     until = time.monotonic() + 10.0
     while device.begun is None and time.monotonic() < until:
         time.sleep(0.02)
-    time.sleep(0.8)
+    time.sleep(0.6)
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=10)
     assert process.returncode == 0
     assert int(re.findall(r"(\d+) scans", said)[0]) == len(scans_of(tmp_path / "a")) >= 2
-    timer = threading.Timer(0.9, device.unplug)
+    timer = threading.Timer(0.6, device.unplug)
     timer.start()
     said = failure("record", "-o", tmp_path / "b", "--port", device.path, "--patience", "0.2")
     timer.join()

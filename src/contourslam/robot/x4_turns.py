@@ -117,8 +117,8 @@ class TurnAssembler:
         """
         bad, skipped = self.parser.bad, self.parser.skipped
         packets = self.parser.feed(data)
-        # Bytes that belong to nothing are a packet whose header was hit.
-        failed = max(self.parser.bad - bad, int(self.parser.skipped > skipped))
+        # Bytes that belong to nothing are a packet whose header was hit, but for those before the first packet.
+        failed = max(self.parser.bad - bad, int(self.parser.skipped > skipped and self._last_deg is not None))
         seen = failed + len(packets)
         if seen:
             weight = 0.995**seen
