@@ -309,10 +309,8 @@ def test_a_reset_begins_anew_and_tells_those_who_draw_the_map(stream: Streams) -
     session = new(drive)
     run(session, [e for e in drive.messages if e[0] < 3.0])
     version = session.map_version
-    assert session.map_changed(version - 1)
-    assert not session.map_changed(version)
     session.reset()
-    assert session.map_changed(version)
+    assert session.map_version > version
     assert len(session.wall_map().ids) == 0
     told = run(session, [e for e in drive.messages if e[0] >= 3.0])
     start = drive.truth(told.done[0].stamp)
@@ -571,7 +569,7 @@ def test_saving_and_loading_on_request_say_what_is_wrong_and_change_nothing(stre
     assert session.map_version == version
     np.testing.assert_array_equal(session.wall_map().end_points, walls.end_points)
     session.load(Path("mine.cmap"))
-    assert session.map_changed(version)
+    assert session.map_version > version
     session.close()
     with pytest.raises(ContourslamError, match="cannot be saved"):
         fake_session(Fake()).save(Path("x"))

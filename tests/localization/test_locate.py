@@ -20,6 +20,7 @@ from contourslam.localization.known_map import KnownMap
 from contourslam.localization.locate import NOT_FOUND, Locator
 from contourslam.localization.looks import constellation_of
 from contourslam.localization.posterior import CONFIDENT, Located, probabilities, unseen_log_odds
+from contourslam.localization.several import SeveralScans
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.oriented import move, oriented_points
 from contourslam.recordings import open_recording
@@ -161,15 +162,15 @@ def test_several_scans_decide_what_one_leaves_open(
 ) -> None:
     """A lidar with a narrow field of view that sees a corner, like others of the room, then turns."""
     segments, narrow, noise = room(*LOPSIDED), math.radians(70.0), np.diag([0.01, 0.01, 0.01]) ** 2
-    scans: list[tuple[Floats, Floats, Floats]] = []
+    several = SeveralScans(30.0)
     alone, before = None, None
     for heading in np.arange(-2.6, 1.5, 0.25):
         pose = np.array([4.0, 1.2, heading])
         points = points_of(scan_of(segments, pose, field_of_view=narrow, start=-0.5 * narrow, beams=120, sigma=0.01))
         alone = alone or lopsided.locate(points)
-        scans.append((points, np.zeros(3) if before is None else between_one(before, pose) + SLIP, noise))
+        several.push(points, np.zeros(3) if before is None else between_one(before, pose) + SLIP, noise)
         before = pose
-    together = lopsided.locate_several(scans)
+    together = lopsided.find(several.view())
     assert alone is not None
     assert before is not None
     assert alone.probability < CONFIDENT

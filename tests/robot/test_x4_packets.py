@@ -13,7 +13,6 @@ from contourslam.robot.x4_packets import (
     correction_deg,
     distance_mm,
     encode_packet,
-    sample_angles_deg,
     spans_deg,
 )
 
@@ -40,10 +39,7 @@ def test_four_captured_packets_are_two_good_ones_a_wrong_checksum_and_a_cut() ->
     assert (parser.good, parser.bad) == (2, 1)
     assert packets.first_deg[0] == packets.last_deg[0] == pytest.approx(351.1875)
     assert packets.first_deg[1] == pytest.approx(351.6875) and packets.last_deg[1] == pytest.approx(10.234375)
-    angles, places = sample_angles_deg(packets)
     assert spans_deg(packets)[1] == pytest.approx(18.546875)  # through 360 degrees
-    assert angles[1] == packets.first_deg[1] and angles[-1] == pytest.approx(370.234375)
-    assert np.diff(angles[1:]) == pytest.approx(np.full(39, 18.546875 / 39)) and places[-1] == 39
     assert distance_mm(packets.raw)[-1] == 0x6C48 / 4
 
 

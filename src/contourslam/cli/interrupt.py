@@ -2,7 +2,8 @@
 
 import os
 import signal
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from types import FrameType, TracebackType
 from typing import Generic, Self, TypeVar
 
@@ -28,6 +29,11 @@ class Interrupt:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         signal.signal(signal.SIGINT, self._previous)
+
+    def or_after(self, seconds: float | None) -> Callable[[], bool]:
+        """Give what says whether to stop: after Ctrl-C, or once so many seconds from now are over; None for never."""
+        until = None if seconds is None else time.monotonic() + seconds
+        return lambda: self.requested or (until is not None and time.monotonic() > until)
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         if self.requested:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from contourslam.cli.console import note, print_json
 from contourslam.cli.interrupt import Interrupt
-from contourslam.cli.options import Json
+from contourslam.cli.options import Baud, Json, Patience, Port
 from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -28,14 +28,11 @@ class Lidar:
     Example: contourslam lidar --port /dev/ttyUSB0
     """
 
-    port: str | None = None
-    """Serial port; found by itself where only one can be the lidar's."""
-    baud: int = 128000
-    """Bits a second."""
+    port: Port = None
+    baud: Baud = 128000
     seconds: float | None = None
     """How long to look, s; on a terminal until Ctrl-C where left out, elsewhere 3."""
-    patience: float = 30.0
-    """How long to wait for a lidar that was unplugged, s."""
+    patience: Patience = 30.0
     json: Json = False
 
     def execute(self, command: str) -> int:
@@ -50,10 +47,8 @@ class Lidar:
         tally, drawn = LidarTally(), 0.0
         with Interrupt() as interrupt, YdlidarX4(self.port, baud=self.baud, patience=self.patience) as lidar:
             info = lidar.info()
-            until = None if span is None else time.monotonic() + span
-            stopped = lambda: interrupt.requested or (until is not None and time.monotonic() > until)  # noqa: E731
             scan = None
-            for scan in lidar.scans(stopped):
+            for scan in lidar.scans(interrupt.or_after(span)):
                 tally.add(scan)
                 if live and time.monotonic() - drawn > _REDRAW:
                     drawn = time.monotonic()

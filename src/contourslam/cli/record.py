@@ -1,6 +1,5 @@
 """``contourslam record``: the scans of a lidar, written as a recording."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +8,7 @@ import tyro
 
 from contourslam.cli.console import make_way, note, print_json
 from contourslam.cli.interrupt import Interrupt
-from contourslam.cli.options import Json, Overwrite
+from contourslam.cli.options import Baud, Json, Overwrite, Patience, Port
 from contourslam.errors import ConfigError
 
 
@@ -27,14 +26,11 @@ class Record:
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="DIR")]
     """Folder of the recording to write."""
     overwrite: Overwrite = False
-    port: str | None = None
-    """Serial port; found by itself where only one can be the lidar's."""
-    baud: int = 128000
-    """Bits a second."""
+    port: Port = None
+    baud: Baud = 128000
     seconds: float | None = None
     """How long to record, s; until Ctrl-C where left out."""
-    patience: float = 30.0
-    """How long to wait for a lidar that was unplugged, s."""
+    patience: Patience = 30.0
     json: Json = False
 
     def execute(self, command: str) -> int:
@@ -50,10 +46,8 @@ class Record:
         count, first, last = 0, 0.0, 0.0
         with Interrupt() as interrupt, YdlidarX4(self.port, baud=self.baud, patience=self.patience) as lidar:
             make_way(self.output, overwrite=self.overwrite)  # only once there is a lidar to replace it with
-            until = None if self.seconds is None else time.monotonic() + self.seconds
-            stopped = lambda: interrupt.requested or (until is not None and time.monotonic() > until)  # noqa: E731
             with RecordingWriter(self.output) as writer:
-                scans = lidar.scans(stopped)
+                scans = lidar.scans(interrupt.or_after(self.seconds))
                 for scan in tqdm(scans, unit=" scan", delay=1.0, disable=None, leave=False):
                     writer.write(even_beams(scan))
                     first, last, count = first if count else scan.stamp, scan.stamp, count + 1

@@ -213,10 +213,6 @@ class Session:
         """A number that grows whenever the map may have changed."""
         return self._version
 
-    def map_changed(self, version: int) -> bool:
-        """Whether the map may have changed since :attr:`map_version` was `version`."""
-        return self._version != version
-
     def latest_map(self) -> Drawn | None:
         """Give the map as it was drawn up last, and have it drawn up anew as soon as no scan waits. Never waits itself.
 

@@ -1,7 +1,6 @@
 """Finding a robot in a known map without a first guess: propose, align, weigh, and say how sure that is."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,6 @@ from contourslam.localization.posterior import (
     same_place,
     unseen_log_odds,
 )
-from contourslam.localization.several import SeveralScans
 from contourslam.localization.view import View, view_of
 from contourslam.matching.align import align
 from contourslam.matching.certainty import hold
@@ -96,30 +94,6 @@ class Locator:
         held = hold(view.points, self.known.around(best.pose), best.pose)
         covariance = turned(held.covariance(held.variance, 0.0), best.pose[2])
         return Located(best.pose, covariance, float(shares[0]), others, best.method)
-
-    def locate_several(
-        self, scans: Iterable[tuple[Floats, Floats, Floats]], *, max_range: float = 30.0, lidar: Floats | None = None
-    ) -> Located:
-        """Find several scans of one drive together.
-
-        Parameters
-        ----------
-        scans : iterable of (oriented, increment, noise)
-            As :meth:`contourslam.localization.several.SeveralScans.push` takes them.
-        max_range : float
-            No contour point lies farther from the robot than this, m.
-        lidar : ndarray, shape (>= 2,), optional
-            As for :meth:`locate`.
-
-        Returns
-        -------
-        Located
-            The base at the last scan.
-        """
-        several = SeveralScans(max_range, lidar)
-        for oriented, increment, noise in scans:
-            several.push(oriented, increment, noise)
-        return self.find(several.view())
 
     def _look(self, view: View, pose: Floats, method: str) -> _Candidate:
         """Align the view where a pose was proposed, and weigh what then speaks for it."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.geometry.poses import compose
+from contourslam.geometry.poses import compose, transform
 from contourslam.report.occupancy import OccupancyGrid
 
 Floats = NDArray[np.float64]
@@ -40,8 +40,6 @@ def outline_grid(
     """
     grid = OccupancyGrid(resolution)
     for pose, seen in zip(poses, points, strict=True):
-        ends = seen[:, :2].astype(np.float64)
-        cos, sin = np.cos(pose[2]), np.sin(pose[2])
-        world = ends @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
+        world = transform(pose, seen[:, :2].astype(np.float64))
         grid.add(np.broadcast_to(compose(pose, lidar_mount)[:2], world.shape), world)
     return grid

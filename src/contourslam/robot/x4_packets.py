@@ -176,14 +176,6 @@ def spans_deg(packets: Packets) -> Floats:
     return np.where(span > 300.0, span - 360.0, span)
 
 
-def sample_angles_deg(packets: Packets) -> tuple[Floats, NDArray[np.int64]]:
-    """Uncorrected direction of every sample, degrees clockwise from the first angle on, and its place in its packet."""
-    ends = np.cumsum(packets.counts)
-    place = np.arange(len(packets.raw)) - np.repeat(ends - packets.counts, packets.counts)
-    steps = spans_deg(packets) / np.maximum(packets.counts - 1, 1)
-    return np.repeat(packets.first_deg, packets.counts) + np.repeat(steps, packets.counts) * place, place
-
-
 def encode_packet(first_deg: float, last_deg: float, mm: ArrayLike, *, start: bool = False) -> bytes:
     """Make a packet, as the lidar does.
 

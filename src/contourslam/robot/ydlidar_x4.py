@@ -12,20 +12,18 @@ from contourslam.robot.lidar_errors import (
     LidarBaudError,
     LidarError,
     LidarFaultError,
-    LidarNoisyError,
     LidarPowerError,
     LidarSilentError,
-    LidarStalledError,
     LidarUnpluggedError,
 )
 from contourslam.robot.serial_port import find_port, open_port, set_dtr
 from contourslam.robot.x4_turns import TurnAssembler
+from contourslam.robot.x4_watch import Watch
 from contourslam.scan import LaserScan
 
 BAUD = 128000
 SCAN, STOP, INFO, HEALTH, RESTART = (bytes([0xA5, code]) for code in (0x60, 0x65, 0x90, 0x91, 0x80))
 _REPLY = b"\xa5\x5a"
-_MOST_TRIES = 3  # a lidar that lost its power needs a second or two until it hears
 _BATCH = 0.015  # s of bytes read at once: fewer wake-ups, and the clock knows that they are late
 _MOST_RESTARTS, _RESTART_SPAN = 3, 60.0  # more than so many in so many seconds is a supply that does not hold
 
@@ -215,7 +213,7 @@ class YdlidarX4:
             One of its kinds: silent, wrong baud, noisy, stalled, power, unplugged, fault.
         """
         self.start()
-        watch = _Watch(self)
+        watch = Watch(self)
         while not stopped():
             try:
                 data = self._read()
@@ -234,7 +232,7 @@ class YdlidarX4:
             except LidarUnpluggedError:
                 if not self._reconnect(stopped):
                     return
-            watch = _Watch(self)
+            watch = Watch(self)
 
     def _begin(self) -> None:
         self._motor(True)
@@ -337,59 +335,3 @@ class YdlidarX4:
     def timeout(self) -> float:
         """Time without bytes, or without a good packet, after which something is wrong, s."""
         return self._timeout
-
-
-class _Watch:
-    """Looks after a scan since it was begun: silence, nonsense, damage, a head that does not turn."""
-
-    def __init__(self, lidar: YdlidarX4) -> None:
-        self._lidar, self._parser = lidar, lidar.turns.parser
-        self._begun = self._heard = self._sensible = self._turned = time.monotonic()
-        self._good, self._turns, self._received = self._counters()
-        self._ever = False
-
-    def _counters(self) -> tuple[int, int, int]:
-        return self._parser.good, self._lidar.turns.turns, self._parser.received
-
-    def saw(self, count: int) -> None:
-        if count:
-            self._heard = time.monotonic()
-
-    def patient(self) -> bool:
-        """Whether silence is still to be borne; notes a restart where it is not."""
-        now = time.monotonic()
-        # After the first command a motor may need time; a stream that breaks off has no such excuse.
-        if now - self._heard < (0.5 if self._ever else 1.0) * self._lidar.timeout:
-            return True
-        if self._lidar.unheard >= _MOST_TRIES:
-            raise self._lidar.no_answer(0)
-        self._lidar.told_again()
-        return False
-
-    def judge(self) -> None:
-        """Raise what is wrong."""
-        now = time.monotonic()
-        good, turns, received = self._counters()
-        lidar = self._lidar
-        if good > self._good:
-            self._good, self._sensible, self._ever = good, now, True
-            lidar.unheard = 0
-        elif now - self._sensible > (5.0 if self._ever else 1.0) * lidar.timeout and received > self._received:
-            if not self._parser.good:
-                raise lidar.no_answer(received - self._received)
-            raise self._noisy(now - self._sensible)
-        if turns > self._turns:
-            self._turns, self._turned = turns, now
-        elif lidar.turns.noisy and now - self._turned > 10.0 * lidar.timeout:
-            raise self._noisy(now - self._turned)
-        elif not lidar.turns.noisy and now - self._turned > 3.0 * lidar.timeout:
-            raise LidarStalledError(
-                f"{lidar.name}: samples come but no turn ends: the motor stands or is too slow; see that nothing holds "
-                "the head, and that the supply gives 5 V and 1 A"
-            )
-
-    def _noisy(self, seconds: float) -> LidarNoisyError:
-        return LidarNoisyError(
-            f"{self._lidar.name}: no turn was measured for {seconds:.1f} s, for {self._lidar.turns.failing:.0%} of the "
-            "last packets fail their checksum; check the cable and its distance from the motors"
-        )
