@@ -14,6 +14,8 @@ from contourslam.live.outlines import outlines
 from contourslam.live.resuming import Resuming
 from contourslam.live.session import Session
 from contourslam.localization.follow import Localizer
+from contourslam.localization.known_map import KnownMap
+from contourslam.localization.locate import Locator
 from contourslam.maps.file import load_map, save_map
 from contourslam.maps.saved_map import SavedMap
 from contourslam.replay import keep_map, make_mapper
@@ -130,17 +132,19 @@ def localization(
         If the map cannot be read, or nothing can be localised in it.
     """
     current = load_map(map_file)
+    finder = Locator(KnownMap(current))  # made ready once: a robot that is lost must not wait for it
 
     def begin(pose: Floats | None = initial_pose) -> Mapper:
-        return Localizer(current, config, initial_pose=pose, lidar_mount=lidar_mount)
+        return Localizer(current, config, finder=finder, initial_pose=pose, lidar_mount=lidar_mount)
 
     def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
         return begin(pose)
 
     def open_map(saved: SavedMap) -> Mapper:
-        nonlocal current
-        mapper = Localizer(saved, config, lidar_mount=lidar_mount)
-        current = saved
+        nonlocal current, finder
+        ready = Locator(KnownMap(saved))
+        mapper = Localizer(saved, config, finder=ready, lidar_mount=lidar_mount)
+        current, finder = saved, ready
         return mapper
 
     def localized(mapper: Mapper) -> bool:
