@@ -8,8 +8,9 @@ import numpy as np
 from contourslam.contour.contours import Floats
 from contourslam.errors import MapError
 from contourslam.geometry.poses import between_one
+from contourslam.localization.known_map import along
 from contourslam.maps import SavedMap
-from contourslam.matching.cell_map import CELL, CellMap
+from contourslam.matching.cell_map import CellMap
 from contourslam.matching.small import moved
 from contourslam.slam.landmark_map import WallMap
 
@@ -99,9 +100,5 @@ def _table(points: Floats) -> CellMap:
 
 def _faces(walls: WallMap) -> Floats:
     """Points along walls with the normal into free space: x, y, nx, ny."""
-    rows = [np.empty((0, 4))]
-    for (first, last), normal in zip(walls.end_points, walls.normals, strict=True):
-        parts = np.linspace(0.0, 1.0, max(math.ceil(math.dist(first, last) / CELL), 1) + 1)[:, None]
-        points = first + parts * (last - first)
-        rows.append(np.column_stack([points, np.tile([-math.cos(normal), -math.sin(normal)], (len(points), 1))]))
-    return np.concatenate(rows)
+    ends = zip(walls.end_points, walls.normals, strict=True)
+    return np.concatenate([np.empty((0, 4)), *(along(first, last, normal + math.pi) for (first, last), normal in ends)])

@@ -116,7 +116,7 @@ def _drawn(landmarks: Constellation) -> Floats:
     """Contour points of walls, and of the sides of corners."""
     rows = [np.empty((0, 4))]
     for (first, last), normal in zip(landmarks.end_points, landmarks.normals, strict=True):
-        rows.append(_along(first, last, normal + math.pi))
+        rows.append(along(first, last, normal + math.pi))
     for corner, direction, opening, convex in zip(
         landmarks.corners, landmarks.directions, landmarks.openings, landmarks.convex, strict=True
     ):
@@ -124,11 +124,12 @@ def _drawn(landmarks: Constellation) -> Floats:
             angle = direction + side * opening
             end = corner + SIDE * np.array([math.cos(angle), math.sin(angle)])
             inward = angle - math.copysign(0.5 * math.pi, side)  # into the angle that the sides enclose
-            rows.append(_along(corner, end, inward + math.pi if convex else inward))
+            rows.append(along(corner, end, inward + math.pi if convex else inward))
     return np.concatenate(rows)
 
 
-def _along(first: Floats, last: Floats, normal: float) -> Floats:
+def along(first: Floats, last: Floats, normal: float) -> Floats:
+    """Contour points from `first` to `last` whose normal, into free space, points to `normal` (rad): x, y, nx, ny."""
     count = max(math.ceil(math.hypot(*(last - first)) / MERGED), 1)
     parts = (np.arange(count) + 0.5) / count
     points = first + parts[:, None] * (last - first)
