@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contourslam.robot.even_beams import even_beams
-from contourslam.robot.x4_packets import encode_packet
-from contourslam.robot.x4_turns import TurnAssembler
+from contourslam.robot.lidar.even_beams import even_beams
+from contourslam.robot.lidar.x4_packets import encode_packet
+from contourslam.robot.lidar.x4_turns import TurnAssembler
 from table import Table, publish
 
 RATE, TURNS, SAMPLES = 7.0, 350, 5000.0

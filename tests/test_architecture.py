@@ -14,9 +14,34 @@ ROOT = PACKAGE.parents[1]
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
 GROUND = ("errors", "atomic", "config", "kernels", "geometry", "scan")
 LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "replay")
-ORDER = (*GROUND, *LINE, "live", "recordings", "robot", "simulation", "evaluation", "experiments", "report", "cli")
-EXTRAS = {"serial", "gtsam", "mujoco", "shapely", "matplotlib", "mpl_toolkits", "evo", "scipy"}
-MAY_USE_EXTRAS = ("graph", "robot", "simulation", "evaluation", "experiments", "report")
+ORDER = (
+    *GROUND,
+    *LINE,
+    "live",
+    "recordings",
+    "robot",
+    "scene",
+    "simulation",
+    "evaluation",
+    "experiments",
+    "report",
+    "cli",
+)
+EXTRAS = {
+    "serial",
+    "cv2",
+    "trimesh",
+    "PIL",
+    "picamera2",
+    "gtsam",
+    "mujoco",
+    "shapely",
+    "matplotlib",
+    "mpl_toolkits",
+    "evo",
+    "scipy",
+}
+MAY_USE_EXTRAS = ("graph", "robot", "scene", "simulation", "evaluation", "experiments", "report")
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -12,8 +12,8 @@ from contourslam.cli.options import Baud, Json, Patience, Port
 from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from contourslam.robot.lidar_figures import LidarTally
-    from contourslam.robot.ydlidar_x4 import DeviceInfo, YdlidarX4
+    from contourslam.robot.lidar.figures import LidarTally
+    from contourslam.robot.lidar.ydlidar_x4 import DeviceInfo, YdlidarX4
     from contourslam.scan import LaserScan
 
 _REDRAW = 0.2  # s
@@ -37,8 +37,8 @@ class Lidar:
 
     def execute(self, command: str) -> int:
         """Watch the lidar and say what was seen."""
-        from contourslam.robot.lidar_figures import LidarTally
-        from contourslam.robot.ydlidar_x4 import YdlidarX4
+        from contourslam.robot.lidar.figures import LidarTally
+        from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
 
         if self.seconds is not None and not self.seconds > 0.0:
             raise ConfigError(f"--seconds must be above 0, got {self.seconds}")
@@ -100,7 +100,7 @@ def _print(found: dict[str, Any]) -> None:
 
 
 def _draw(scan: "LaserScan", lidar: "YdlidarX4", tally: "LidarTally") -> None:
-    from contourslam.robot.lidar_figures import polar_picture
+    from contourslam.robot.lidar.figures import polar_picture
 
     size = shutil.get_terminal_size()
     lines, metres = polar_picture(scan, size.columns - 1, size.lines - 3)

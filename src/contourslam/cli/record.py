@@ -38,8 +38,8 @@ class Record:
         from tqdm import tqdm
 
         from contourslam.recordings import RecordingWriter
-        from contourslam.robot.even_beams import even_beams
-        from contourslam.robot.ydlidar_x4 import YdlidarX4
+        from contourslam.robot.lidar.even_beams import even_beams
+        from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
 
         if self.seconds is not None and not self.seconds > 0.0:
             raise ConfigError(f"--seconds must be above 0, got {self.seconds}")

@@ -2,10 +2,11 @@
 
 import errno
 import os
+from dataclasses import dataclass
 from typing import Any
 
 from contourslam.errors import MissingExtraError
-from contourslam.robot.lidar_errors import LidarBusyError, LidarError, LidarNotFoundError, LidarPermissionError
+from contourslam.robot.device_errors import DeviceBusyError, DeviceError, DeviceNotFoundError, DevicePermissionError
 
 _NO_MODEM_LINES = (errno.ENOTTY, errno.EINVAL)  # what a pseudo-terminal answers when asked for DTR
 
@@ -18,8 +19,30 @@ def _serial() -> Any:
     return serial
 
 
-def list_ports() -> list[tuple[str, str, bool]]:
-    """List the serial ports: name, what the system calls it, and whether it is the kind of bridge on the X4's board.
+@dataclass(frozen=True, slots=True)
+class SerialPart:
+    """A part of the robot that hangs on a serial port.
+
+    Attributes
+    ----------
+    name : str
+        What a message calls it.
+    usb : tuple of (int, int)
+        Vendor and product of the USB bridges on its board.
+    """
+
+    name: str
+    usb: tuple[tuple[int, int], ...]
+
+
+LIDAR = SerialPart("lidar", ((0x10C4, 0xEA60),))
+"""The X4's board has a CP2102."""
+BASE = SerialPart("base", ((0x2341, 0x0042), (0x2341, 0x0010), (0x2A03, 0x0042), (0x1A86, 0x7523)))
+"""An Arduino Mega 2560, or one of its copies with a CH340."""
+
+
+def list_ports() -> list[tuple[str, str, tuple[int, int] | None]]:
+    """List the serial ports: name, what the system calls it, and its USB vendor and product.
 
     Raises
     ------
@@ -30,36 +53,41 @@ def list_ports() -> list[tuple[str, str, bool]]:
     from serial.tools import list_ports as tools
 
     found = sorted(tools.comports(), key=lambda port: str(port.device))
-    return [(port.device, port.description, (port.vid, port.pid) == (0x10C4, 0xEA60)) for port in found]
+    return [(p.device, p.description, None if p.vid is None else (p.vid, p.pid)) for p in found]
 
 
-def _there_are() -> str:
+def _there_are(part: SerialPart) -> str:
     ports = ", ".join(f"{name} ({what})" if what and what != "n/a" else name for name, what, _ in list_ports())
-    return f"the ports there are: {ports}" if ports else "there is no serial port at all: plug the lidar's USB board in"
+    if ports:
+        return f"the ports there are: {ports}"
+    return f"there is no serial port at all: plug the {part.name}'s USB cable in"
 
 
-def find_port() -> str:
-    """Find the port of the lidar: the only one with a CP2102 bridge, or else the only port.
+def find_port(part: SerialPart) -> str:
+    """Find the port of a part: the only one with its bridge, or else the only port that is not known as another part's.
 
     Raises
     ------
-    LidarNotFoundError
+    DeviceNotFoundError
         If there is none, or more than one.
     """
     ports = list_ports()
-    likely = [name for name, _, bridge in ports if bridge] or [name for name, _, _ in ports]
+    others = {usb for other in (LIDAR, BASE) if other is not part for usb in other.usb}
+    likely = [name for name, _, usb in ports if usb in part.usb] or [n for n, _, usb in ports if usb not in others]
     if len(likely) == 1:
         return likely[0]
+    there = _there_are(part)
     if likely:
-        raise LidarNotFoundError(f"more than one port could be the lidar's: choose one with --port; {_there_are()}")
-    raise LidarNotFoundError(f"no lidar was found: {_there_are()}")
+        raise DeviceNotFoundError(f"more than one port could be the {part.name}'s: choose one with --port; {there}")
+    raise DeviceNotFoundError(f"no {part.name} was found: {there}")
 
 
-def open_port(name: str, baud: int) -> Any:
-    """Open a port for this process alone, with the motor's line (DTR) down where the port has one.
+def open_port(part: SerialPart, name: str, baud: int) -> Any:
+    """Open a port for this process alone, with its DTR line down where it has one (the X4's motor hangs on it).
 
     Parameters
     ----------
+    part : SerialPart
     name : str
     baud : int
         Bits a second.
@@ -71,9 +99,9 @@ def open_port(name: str, baud: int) -> Any:
 
     Raises
     ------
-    LidarNotFoundError, LidarPermissionError, LidarBusyError
+    DeviceNotFoundError, DevicePermissionError, DeviceBusyError
         With what to try.
-    LidarError
+    DeviceError
         For any other reason.
     """
     serial = _serial()
@@ -84,12 +112,12 @@ def open_port(name: str, baud: int) -> Any:
     except (OSError, ValueError) as error:  # SerialException is an OSError
         number = getattr(error, "errno", None)
         if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-            raise LidarNotFoundError(f"{name}: there is no such port; {_there_are()}") from error
+            raise DeviceNotFoundError(f"{name}: there is no such port; {_there_are(part)}") from error
         if number in (errno.EACCES, errno.EPERM):
-            raise LidarPermissionError(f"{name}: {_join_group(name)}") from error
+            raise DevicePermissionError(f"{name}: {_join_group(name)}") from error
         if number in (errno.EBUSY, errno.EAGAIN):
-            raise LidarBusyError(f"{name}: another program holds the port; end it (`fuser {name}` names it)") from error
-        raise LidarError(f"{name}: cannot be opened as a serial port at {baud} baud ({error})") from error
+            raise DeviceBusyError(f"{name}: another program holds the port; end it (see `fuser {name}`)") from error
+        raise DeviceError(f"{name}: cannot be opened as a serial port at {baud} baud ({error})") from error
     return port
 
 

@@ -7,10 +7,10 @@ import pytest
 from x4_device import BYTE, packets, square_room
 
 from contourslam.geometry.angles import wrap
-from contourslam.robot.even_beams import even_beams
-from contourslam.robot.lidar_figures import LidarTally, polar_picture, range_noise
-from contourslam.robot.x4_packets import encode_packet
-from contourslam.robot.x4_turns import TurnAssembler
+from contourslam.robot.lidar.even_beams import even_beams
+from contourslam.robot.lidar.figures import LidarTally, polar_picture, range_noise
+from contourslam.robot.lidar.x4_packets import encode_packet
+from contourslam.robot.lidar.x4_turns import TurnAssembler
 from contourslam.scan import LaserScan
 
 Damage = Callable[[bytes, np.random.Generator], bytes]

@@ -3,10 +3,10 @@
 import time
 from typing import TYPE_CHECKING
 
-from contourslam.robot.lidar_errors import LidarNoisyError, LidarStalledError
+from contourslam.robot.device_errors import DeviceNoisyError, LidarStalledError
 
 if TYPE_CHECKING:
-    from contourslam.robot.ydlidar_x4 import YdlidarX4
+    from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
 
 MOST_TRIES = 3  # a lidar that lost its power needs a second or two until it hears
 
@@ -67,8 +67,8 @@ class Watch:
                 "the head, and that the supply gives 5 V and 1 A"
             )
 
-    def _noisy(self, seconds: float) -> LidarNoisyError:
-        return LidarNoisyError(
+    def _noisy(self, seconds: float) -> DeviceNoisyError:
+        return DeviceNoisyError(
             f"{self._lidar.name}: no turn was measured for {seconds:.1f} s, for {self._lidar.turns.failing:.0%} of the "
             "last packets fail their checksum; check the cable and its distance from the motors"
         )

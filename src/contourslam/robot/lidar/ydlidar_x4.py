@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from contourslam.robot.lidar_errors import (
-    LidarBaudError,
-    LidarError,
-    LidarFaultError,
-    LidarPowerError,
-    LidarSilentError,
-    LidarUnpluggedError,
+from contourslam.robot.device_errors import (
+    DeviceBaudError,
+    DeviceError,
+    DeviceFaultError,
+    DevicePowerError,
+    DeviceSilentError,
+    DeviceUnpluggedError,
 )
-from contourslam.robot.serial_port import find_port, open_port, set_dtr
-from contourslam.robot.x4_turns import TurnAssembler
-from contourslam.robot.x4_watch import Watch
+from contourslam.robot.lidar.x4_turns import TurnAssembler
+from contourslam.robot.lidar.x4_watch import Watch
+from contourslam.robot.serial_port import LIDAR, find_port, open_port, set_dtr
 from contourslam.scan import LaserScan
 
 BAUD = 128000
@@ -93,7 +93,7 @@ class YdlidarX4:
 
     Raises
     ------
-    LidarError
+    DeviceError
         One of its kinds, when the port cannot be opened.
     MissingExtraError
         If pyserial is not installed.
@@ -127,15 +127,15 @@ class YdlidarX4:
         self.close()
 
     def _open(self) -> None:
-        self.name = self._wanted or find_port()
-        self._port = open_port(self.name, self._baud)
+        self.name = self._wanted or find_port(LIDAR)
+        self._port = open_port(LIDAR, self.name, self._baud)
 
     def info(self) -> DeviceInfo:
         """Ask for model, versions and serial number; ends a scan that runs.
 
         Raises
         ------
-        LidarSilentError, LidarBaudError, LidarUnpluggedError
+        DeviceSilentError, DeviceBaudError, DeviceUnpluggedError
             If no answer comes.
         """
         content = self._ask(INFO, 0x04, 20)
@@ -147,7 +147,7 @@ class YdlidarX4:
 
         Raises
         ------
-        LidarSilentError, LidarBaudError, LidarUnpluggedError
+        DeviceSilentError, DeviceBaudError, DeviceUnpluggedError
             If no answer comes.
         """
         content = self._ask(HEALTH, 0x06, 3)
@@ -158,14 +158,14 @@ class YdlidarX4:
 
         Raises
         ------
-        LidarFaultError
+        DeviceFaultError
             If the lidar reports a fault.
-        LidarSilentError, LidarBaudError, LidarUnpluggedError
+        DeviceSilentError, DeviceBaudError, DeviceUnpluggedError
             If it does not answer.
         """
         health = self.health()
         if health.status >= 2:
-            raise LidarFaultError(
+            raise DeviceFaultError(
                 f"{self.name}: the lidar reports fault {health.code}; take its power away for 5 s and try again"
             )
         self._begin()
@@ -185,7 +185,7 @@ class YdlidarX4:
         """Stop the lidar and free the port; no error, for a port that has gone is closed too."""
         if self._port is None:
             return
-        with suppress(LidarError):
+        with suppress(DeviceError):
             self.stop()
         with suppress(OSError):
             self._port.close()
@@ -209,7 +209,7 @@ class YdlidarX4:
 
         Raises
         ------
-        LidarError
+        DeviceError
             One of its kinds: silent, wrong baud, noisy, stalled, power, unplugged, fault.
         """
         self.start()
@@ -224,12 +224,12 @@ class YdlidarX4:
                     watch.judge()
                     continue
                 if len(self._restarted) > _MOST_RESTARTS:
-                    raise LidarPowerError(
+                    raise DevicePowerError(
                         f"{self.name}: the lidar stopped {len(self._restarted)} times within a minute; its supply "
                         "dips: feed its second USB socket with 5 V and 1 A, or use a shorter cable"
                     )
                 self._begin()
-            except LidarUnpluggedError:
+            except DeviceUnpluggedError:
                 if not self._reconnect(stopped):
                     return
             watch = Watch(self)
@@ -259,9 +259,9 @@ class YdlidarX4:
                 self.start()
                 self.reconnections += 1
                 return True
-            except LidarError as error:  # the rights to a new port come a moment after it, and a lidar has to boot
+            except DeviceError as error:  # the rights to a new port come a moment after it, and a lidar has to boot
                 if time.monotonic() + pause > until:
-                    raise LidarUnpluggedError(
+                    raise DeviceUnpluggedError(
                         f"{self.name}: the lidar was unplugged and has not come back within {self._patience:.0f} s; "
                         f"plug it in and start again (last: {error})"
                     ) from error
@@ -296,8 +296,8 @@ class YdlidarX4:
             raise self._gone(error) from error
         return data
 
-    def _gone(self, error: Exception) -> LidarUnpluggedError:
-        return LidarUnpluggedError(f"{self.name}: the port has gone ({error}); check the plug and the cable")
+    def _gone(self, error: Exception) -> DeviceUnpluggedError:
+        return DeviceUnpluggedError(f"{self.name}: the port has gone ({error}); check the plug and the cable")
 
     def _ask(self, command: bytes, kind: int, length: int) -> bytes:
         """Send a command and wait for its answer's content."""
@@ -320,13 +320,13 @@ class YdlidarX4:
                 return kept[at + len(head) : at + len(head) + length]
         raise self.no_answer(received)
 
-    def no_answer(self, received: int) -> LidarError:
+    def no_answer(self, received: int) -> DeviceError:
         """Make the error for a lidar of which nothing can be understood."""
         if not received:
-            return LidarSilentError(
+            return DeviceSilentError(
                 f"{self.name}: no data within {self._timeout:g} s; check the lidar's power and that this is its port"
             )
-        return LidarBaudError(
+        return DeviceBaudError(
             f"{self.name}: {received} bytes came at {self._baud} baud and none make sense; the X4 has {BAUD} baud: "
             "check --baud, and that this port is the lidar's"
         )

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.robot.x4_packets import correction_deg, encode_packet
+from contourslam.robot.lidar.x4_packets import correction_deg, encode_packet
 
 Floats = NDArray[np.float64]
 BYTE = 10 / 128000

@@ -10,19 +10,19 @@ from x4_device import HEALTH, Device, square_room
 
 from contourslam.errors import MissingExtraError
 from contourslam.robot import serial_port
-from contourslam.robot.lidar_errors import (
-    LidarBaudError,
-    LidarBusyError,
-    LidarFaultError,
-    LidarNoisyError,
-    LidarNotFoundError,
-    LidarPermissionError,
-    LidarPowerError,
-    LidarSilentError,
+from contourslam.robot.device_errors import (
+    DeviceBaudError,
+    DeviceBusyError,
+    DeviceFaultError,
+    DeviceNoisyError,
+    DeviceNotFoundError,
+    DevicePermissionError,
+    DevicePowerError,
+    DeviceSilentError,
+    DeviceUnpluggedError,
     LidarStalledError,
-    LidarUnpluggedError,
 )
-from contourslam.robot.ydlidar_x4 import Health, YdlidarX4
+from contourslam.robot.lidar.ydlidar_x4 import Health, YdlidarX4
 
 
 def lidar_at(device: Device, *, timeout: float = 0.4, patience: float = 5.0) -> YdlidarX4:
@@ -67,13 +67,13 @@ def test_a_lidar_that_stays_away_is_given_up(device: Device) -> None:
         scans = lidar.scans()
         next(scans)
         device.unplug()
-        with pytest.raises(LidarUnpluggedError, match=r"unplugged and has not come back within .* plug it in"):
+        with pytest.raises(DeviceUnpluggedError, match=r"unplugged and has not come back within .* plug it in"):
             next(scans)
 
 
 def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device: Device) -> None:
     with lidar_at(device, timeout=0.2) as lidar:
-        with pytest.raises(LidarPowerError, match="supply dips"):
+        with pytest.raises(DevicePowerError, match="supply dips"):
             for _ in lidar.scans():
                 device.reboot()
         assert lidar.restarts == 4
@@ -81,20 +81,20 @@ def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device:
 
 def test_silence_is_told(device: Device) -> None:
     device.deaf = True
-    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(LidarSilentError, match=r"no data within .* power"):
+    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(DeviceSilentError, match=r"no data within .* power"):
         next(lidar.scans())
 
 
 def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: Device) -> None:
     device.silent = True
-    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(LidarSilentError, match="no data"):
+    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(DeviceSilentError, match="no data"):
         next(lidar.scans())
     assert device.commands.count(0x60) == 4
 
 
 def test_nonsense_is_a_wrong_speed(device: Device) -> None:
     device.garbage = True
-    with lidar_at(device) as lidar, pytest.raises(LidarBaudError, match="none make sense; the X4 has 128000 baud"):
+    with lidar_at(device) as lidar, pytest.raises(DeviceBaudError, match="none make sense; the X4 has 128000 baud"):
         lidar.info()
 
 
@@ -109,7 +109,7 @@ def test_a_line_on_which_nothing_passes_any_more_is_told(device: Device) -> None
         scans = lidar.scans()
         next(scans)
         device.damage = 0.7
-        with pytest.raises(LidarNoisyError, match=r"\d% of the last packets fail .* cable"):
+        with pytest.raises(DeviceNoisyError, match=r"\d% of the last packets fail .* cable"):
             for _ in scans:
                 pass
 
@@ -119,14 +119,14 @@ def test_a_line_that_lets_hardly_anything_pass_is_told_with_the_rate(device: Dev
         scans = lidar.scans()
         next(scans)
         device.damage = 0.12
-        with pytest.raises(LidarNoisyError, match=r"\d% of the last packets fail"):
+        with pytest.raises(DeviceNoisyError, match=r"\d% of the last packets fail"):
             for _ in scans:
                 pass
 
 
 def test_a_fault_of_the_lidar_is_told(device: Device) -> None:
     device.health = HEALTH[:7] + bytes([2, 7, 0])
-    with lidar_at(device) as lidar, pytest.raises(LidarFaultError, match="fault 7"):
+    with lidar_at(device) as lidar, pytest.raises(DeviceFaultError, match="fault 7"):
         lidar.start()
 
 
@@ -137,23 +137,36 @@ def test_scans_end_when_asked(device: Device) -> None:
 
 
 def test_two_programs_do_not_share_a_lidar(device: Device) -> None:
-    with lidar_at(device), pytest.raises(LidarBusyError, match="another program holds the port"):
+    with lidar_at(device), pytest.raises(DeviceBusyError, match="another program holds the port"):
         lidar_at(device)
+
+
+CP2102, MEGA = (0x10C4, 0xEA60), (0x2341, 0x0042)
+
+
+def test_the_lidar_and_the_base_are_told_apart_by_their_usb_bridges(monkeypatch: pytest.MonkeyPatch) -> None:
+    ports = [("/dev/ttyACM0", "Arduino Mega", MEGA), ("/dev/ttyUSB0", "CP2102", CP2102)]
+    monkeypatch.setattr(serial_port, "list_ports", lambda: ports)
+    assert serial_port.find_port(serial_port.LIDAR) == "/dev/ttyUSB0"
+    assert serial_port.find_port(serial_port.BASE) == "/dev/ttyACM0"
+    ports.pop()
+    with pytest.raises(DeviceNotFoundError, match="no lidar was found: the ports there are: /dev/ttyACM0"):
+        serial_port.find_port(serial_port.LIDAR)
 
 
 def test_a_port_that_is_not_there_lists_those_that_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(
-        serial_port, "list_ports", lambda: [("/dev/ttyS0", "n/a", False), ("/dev/ttyUSB0", "CP2102", True)]
+        serial_port, "list_ports", lambda: [("/dev/ttyS0", "n/a", None), ("/dev/ttyUSB0", "CP2102", CP2102)]
     )
-    with pytest.raises(LidarNotFoundError, match=r"there are: /dev/ttyS0, /dev/ttyUSB0 \(CP2102\)"):
+    with pytest.raises(DeviceNotFoundError, match=r"there are: /dev/ttyS0, /dev/ttyUSB0 \(CP2102\)"):
         YdlidarX4(str(tmp_path / "none"))
-    assert serial_port.find_port() == "/dev/ttyUSB0"
-    monkeypatch.setattr(serial_port, "list_ports", lambda: [("a", "", False), ("b", "", False)])
-    with pytest.raises(LidarNotFoundError, match="choose one with --port"):
-        serial_port.find_port()
+    assert serial_port.find_port(serial_port.LIDAR) == "/dev/ttyUSB0"
+    monkeypatch.setattr(serial_port, "list_ports", lambda: [("a", "", None), ("b", "", None)])
+    with pytest.raises(DeviceNotFoundError, match="choose one with --port"):
+        serial_port.find_port(serial_port.LIDAR)
     monkeypatch.setattr(serial_port, "list_ports", list)
-    with pytest.raises(LidarNotFoundError, match="no serial port at all"):
-        serial_port.find_port()
+    with pytest.raises(DeviceNotFoundError, match="no serial port at all"):
+        serial_port.find_port(serial_port.LIDAR)
 
 
 def test_without_permission_the_group_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -163,8 +176,8 @@ def test_without_permission_the_group_is_named(monkeypatch: pytest.MonkeyPatch, 
         raise serial.SerialException(13, "no")
 
     monkeypatch.setattr(serial.Serial, "open", refuse)
-    with pytest.raises(LidarPermissionError, match=r"sudo usermod -aG \w+ \$USER"):
-        serial_port.open_port(str(tmp_path), 128000)
+    with pytest.raises(DevicePermissionError, match=r"sudo usermod -aG \w+ \$USER"):
+        serial_port.open_port(serial_port.LIDAR, str(tmp_path), 128000)
 
 
 def test_without_pyserial_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

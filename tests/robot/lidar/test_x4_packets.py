@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contourslam.robot.x4_packets import (
+from contourslam.robot.lidar.x4_packets import (
     LONGEST,
     PacketParser,
     angle_deg,

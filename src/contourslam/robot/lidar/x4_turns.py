@@ -9,8 +9,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap
-from contourslam.robot.x4_clock import SampleClock
-from contourslam.robot.x4_packets import (
+from contourslam.robot.lidar.x4_clock import SampleClock
+from contourslam.robot.lidar.x4_packets import (
     PacketParser,
     Packets,
     correction_deg,
