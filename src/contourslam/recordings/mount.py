@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.geometry.rigid import from_quaternion, rigid
 from contourslam.recordings.ros_messages import frame_name
 
 Floats = NDArray[np.float64]
@@ -28,11 +29,14 @@ class Mount:
         x (m), y (m), yaw (rad).
     mirrored : bool
         It hangs upside down.
+    matrix : ndarray, shape (4, 4)
+        The same place in space, m.
     """
 
     base: str
     pose: tuple[float, float, float]
     mirrored: bool
+    matrix: Floats
 
 
 class FrameTree:
@@ -51,14 +55,21 @@ class FrameTree:
 
     def mount(self, lidar_frame: str, odometry_child: str) -> Mount | None:
         """Find the lidar in the base frame: the one that the odometry speaks of, or else one of the usual names."""
-        lidar = self._ancestors(frame_name(lidar_frame))
+        found = self.from_base(lidar_frame, odometry_child)
+        if found is None:
+            return None
+        base, matrix = found
+        yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+        return Mount(base, (float(matrix[0, 3]), float(matrix[1, 3]), yaw), bool(matrix[2, 2] < 0.0), matrix)
+
+    def from_base(self, frame: str, odometry_child: str) -> tuple[str, Floats] | None:
+        """Find the base frame, and the transform (4, 4) from a frame to it; None where they do not hang together."""
+        above = self._ancestors(frame_name(frame))
         for base in dict.fromkeys((frame_name(odometry_child), *_BASES)):
             up_from_base = self._ancestors(base)
-            common = next((frame for frame in lidar if frame in up_from_base), None)
+            common = next((name for name in above if name in up_from_base), None)
             if base and common is not None:
-                matrix = np.linalg.inv(up_from_base[common]) @ lidar[common]
-                yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
-                return Mount(base, (float(matrix[0, 3]), float(matrix[1, 3]), yaw), bool(matrix[2, 2] < 0.0))
+                return base, np.linalg.inv(up_from_base[common]) @ above[common]
         return None
 
     def _ancestors(self, frame: str) -> dict[str, Floats]:
@@ -80,12 +91,4 @@ def _matrix(transform: Any) -> Floats | None:
     length = math.hypot(q.x, q.y, q.z, q.w)
     if not (abs(length - 1.0) < 0.1 and math.hypot(t.x, t.y, t.z) < _LARGEST):  # so that NaN is refused too
         return None
-    x, y, z, w = q.x / length, q.y / length, q.z / length, q.w / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), t.x],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), t.y],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), t.z],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    return rigid(from_quaternion(q.x, q.y, q.z, q.w), (t.x, t.y, t.z))

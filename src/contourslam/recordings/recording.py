@@ -5,9 +5,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.recordings.picture import Picture
 from contourslam.scan import LaserScan, Odometry, TruePose
 
 Message = LaserScan | Odometry | TruePose
+Camera = tuple[FisheyeModel, NDArray[np.float64]]
+"""A camera's model, and ``T_base_camera``, shape (4, 4), m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +49,13 @@ class Recording(ABC):
         File or folder.
     lidar_mount : tuple of (float, float, float), or None
         x (m), y (m), yaw (rad) of the lidar in the base frame, where the recording says so.
+    T_base_lidar : ndarray, shape (4, 4), or None
+        The same place in space, m.
     skipped : dict of str to int
         Messages that could not be used in the latest pass of :meth:`messages`: the reason, with the place of the
         first, and how many.
+    skipped_pictures : dict of str to int
+        The same of the latest pass of :meth:`pictures`.
     notes : list of str
         What is worth knowing about the recording and changes nothing in how it is read.
     """
@@ -52,7 +63,9 @@ class Recording(ABC):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.lidar_mount: tuple[float, float, float] | None = None
+        self.T_base_lidar: NDArray[np.float64] | None = None
         self.skipped: dict[str, int] = {}
+        self.skipped_pictures: dict[str, int] = {}
         self.notes: list[str] = []
 
     @abstractmethod
@@ -70,6 +83,28 @@ class Recording(ABC):
         RecordingError
             Where the recording is damaged or cut short, after everything before the damage has been yielded.
         """
+
+    def pictures(self, topic: str | None = None) -> Iterator[Picture]:
+        """Yield the pictures in the order of the recording; a damaged one is skipped and counted.
+
+        Each call starts a new pass.
+
+        Parameters
+        ----------
+        topic : str, optional
+            Where several topics hold pictures; by default the only one, or ``/camera/image/compressed``.
+
+        Raises
+        ------
+        RecordingError
+            If the choice of the topic is not clear, and where the recording is damaged or cut short.
+        """
+        return iter(())
+
+    @property
+    def camera(self) -> Camera | None:
+        """Model of the fisheye camera and its place ``T_base_camera`` (4, 4), where the recording says both."""
+        return None
 
     @property
     @abstractmethod

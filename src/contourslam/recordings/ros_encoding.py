@@ -1,12 +1,16 @@
-"""Scans, odometry and true poses turned into ROS 2 messages."""
+"""Scans, odometry, true poses and pictures turned into ROS 2 messages."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from contourslam.errors import RecordingError
-from contourslam.recordings.ros_messages import standard_types
+from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.geometry.rigid import from_planar, quaternion
+from contourslam.recordings.picture import Picture
+from contourslam.recordings.ros_messages import OMNIDIRECTIONAL, standard_types
 from contourslam.scan import LaserScan
 
 # What single precision and a lidar's own resolution leave of an angle, rad, and a generous bound for a beam's time, s.
@@ -86,20 +90,56 @@ class Encoder:
         )
 
     def transform(self, stamp: float, pose: np.ndarray, frame: str, child: str) -> Any:
-        """Build a ``TFMessage`` of one transform."""
-        x, y, heading = map(float, pose)
-        transform = self._make(
-            "geometry_msgs/msg/Transform",
-            translation=self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=0.0),
-            rotation=self._rotation(heading),
+        """Build a ``TFMessage`` of one transform in the plane."""
+        return self.transforms(stamp, frame, {child: from_planar(pose)})
+
+    def transforms(self, stamp: float, frame: str, children: Mapping[str, np.ndarray]) -> Any:
+        """Build a ``TFMessage`` of the places, shape (4, 4), of several frames in one."""
+        made = []
+        for child, matrix in children.items():
+            x, y, z = map(float, matrix[:3, 3])
+            qx, qy, qz, qw = quaternion(matrix[:3, :3])
+            transform = self._make(
+                "geometry_msgs/msg/Transform",
+                translation=self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+                rotation=self._make("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+            )
+            header = self.header(stamp, frame)
+            made.append(
+                self._make(
+                    "geometry_msgs/msg/TransformStamped", header=header, child_frame_id=child, transform=transform
+                )
+            )
+        return self._make("tf2_msgs/msg/TFMessage", transforms=made)
+
+    def picture(self, picture: Picture, frame: str) -> Any:
+        """Build a ``CompressedImage`` message."""
+        return self._make(
+            "sensor_msgs/msg/CompressedImage",
+            header=self.header(picture.stamp, frame),
+            format=picture.encoding,
+            data=np.frombuffer(picture.data, dtype=np.uint8),
         )
-        stamped = self._make(
-            "geometry_msgs/msg/TransformStamped",
+
+    def camera_info(self, stamp: float, model: FisheyeModel, frame: str) -> Any:
+        """Build a ``CameraInfo`` message of the distortion model ``omnidir``."""
+        region = self._make(
+            "sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+        )
+        return self._make(
+            "sensor_msgs/msg/CameraInfo",
             header=self.header(stamp, frame),
-            child_frame_id=child,
-            transform=transform,
+            height=model.height,
+            width=model.width,
+            distortion_model=OMNIDIRECTIONAL,
+            d=np.array([*model.distortion, model.xi, model.field_of_view_deg]),
+            k=model.matrix.ravel(),
+            r=np.eye(3).ravel(),
+            p=np.column_stack([model.matrix, np.zeros(3)]).ravel(),
+            binning_x=0,
+            binning_y=0,
+            roi=region,
         )
-        return self._make("tf2_msgs/msg/TFMessage", transforms=[stamped])
 
     def _rotation(self, heading: float) -> Any:
         half = 0.5 * heading

@@ -27,6 +27,9 @@ TRANSFORMS = "tf2_msgs/msg/TFMessage"
 # ROS 1's first name of it, the same on the wire.
 OLD_TRANSFORMS = "tf/msg/tfMessage"
 
+OMNIDIRECTIONAL = "omnidir"
+"""What a ``CameraInfo`` calls Mei's model; its D is k1, k2, p1, p2, xi and, where known, the full view, degrees."""
+
 # Far beyond any building: a corrupt number must not overflow in what follows.
 _LARGEST = 1e9
 

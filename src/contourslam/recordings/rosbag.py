@@ -2,13 +2,16 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from contourslam.errors import RecordingError, ScanError
+from contourslam.recordings.bag_pictures import BagPictures
 from contourslam.recordings.mount import FrameTree, Mount
-from contourslam.recordings.recording import Message, Recording, SkipCount, Topic
+from contourslam.recordings.picture import Picture
+from contourslam.recordings.recording import Camera, Message, Recording, SkipCount, Topic
 from contourslam.recordings.ros_messages import (
     ODOMETRY,
     TRANSFORM,
@@ -66,18 +69,30 @@ class BagRecording(Recording):
                     self.notes.append(f"{no_odometry(path, topics)}; the scans alone must do")
                     odometry = ""
             self._odometry_topic = odometry
+            self._base = self._base_frame(read)
             mount = self._find_mount(read)
+        self._pictures = BagPictures(self._storage)
+        self.skipped_pictures = self._pictures.skipped
         self._mirrored = mount is not None and mount.mirrored
         if mount is None:
             self.notes.append("no transform says where the lidar sits on the robot")
         else:
-            self.lidar_mount = mount.pose
+            self.lidar_mount, self.T_base_lidar = mount.pose, mount.matrix
         if self._mirrored:
             self.notes.append("the lidar hangs upside down: its angles are negated")
 
     def topics(self) -> list[Topic]:
         """List the topics."""
         return list(self._storage.topics)
+
+    def pictures(self, topic: str | None = None) -> Iterator[Picture]:
+        """See :meth:`Recording.pictures`."""
+        return self._pictures.read(topic)
+
+    @cached_property
+    def camera(self) -> Camera | None:
+        """See :attr:`Recording.camera`."""
+        return self._pictures.camera(self._base)
 
     @property
     def start(self) -> float | None:
@@ -154,17 +169,20 @@ class BagRecording(Recording):
                     return parent, child
         return "", ""
 
+    def _base_frame(self, read: Read) -> str:
+        """Frame of the base that the odometry speaks of; empty where it names none."""
+        if self._types.get(self._odometry_topic) == ODOMETRY:
+            return next((str(m.child_frame_id) for m in self._first(read, self._odometry_topic)), "")
+        return self._odometry_frames[1]
+
     def _find_mount(self, read: Read) -> Mount | None:
         lidar_frame = next((m.header.frame_id for m in self._first(read, self._scan_topic)), None)
         if lidar_frame is None:
             return None
-        base = self._odometry_frames[1]
-        if self._types.get(self._odometry_topic) == ODOMETRY:
-            base = next((m.child_frame_id for m in self._first(read, self._odometry_topic)), "")
         tree = FrameTree()
         for topic, count in (("/tf_static", None), ("/tf", _TF_MESSAGES)):
             for message in self._first(read, topic, count):
                 tree.add(message.transforms)
-            if mount := tree.mount(lidar_frame, base):
+            if mount := tree.mount(lidar_frame, self._base):
                 return mount
         return None

@@ -8,21 +8,26 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from contourslam.errors import RecordingError
-from contourslam.recordings.recording import Message
+from contourslam.geometry.rigid import from_planar, is_rigid
+from contourslam.recordings.picture import Picture
+from contourslam.recordings.recording import Camera, Message
 from contourslam.recordings.ros_encoding import Encoder, split_stamp
 from contourslam.scan import LaserScan, Odometry
 
-_WORLD, _ODOM, _BASE, _LASER = "map", "odom", "base_link", "laser"
+_WORLD, _ODOM, _BASE, _LASER, _CAMERA = "map", "odom", "base_link", "laser", "camera_optical"
 
 
 class RecordingWriter:
     """Writes messages as they come; a context manager.
 
     Scans go to ``/scan`` (frame ``laser``), odometry to ``/odom`` and ``/tf`` (odom to base_link), true poses to
-    ``/ground_truth`` (frame ``map``), the lidar's place to ``/tf_static``. A message is recorded at its stamp, a scan
-    at the time of its last beam, and never before the message before it, so that their order is kept.
+    ``/ground_truth`` (frame ``map``), pictures to ``/camera/image/compressed`` (frame ``camera_optical``), each with
+    the camera's model in ``/camera/camera_info``, the places of lidar and camera to ``/tf_static``. A message is
+    recorded at its stamp, a scan at the time of its last beam, and never before the message before it, so that their
+    order is kept.
 
     When the block is left by an exception, Ctrl-C among them, what was written is closed properly and kept. When the
     writing itself fails, for a full disk say, what was written is kept under another name, ``<path>.partial``, which
@@ -32,19 +37,23 @@ class RecordingWriter:
     ----------
     path : str or Path
         Folder to make; it must not exist.
-    lidar_mount : tuple of (float, float, float), optional
-        x (m), y (m), yaw (rad) of the lidar in the base frame.
+    lidar_mount : tuple of (float, float, float), or array_like of shape (4, 4), optional
+        x (m), y (m), yaw (rad) of the lidar in the base frame, or its place in space, m.
+    camera : tuple of FisheyeModel and ndarray of shape (4, 4), optional
+        Model of the camera, and its place ``T_base_camera``, m.
 
     Raises
     ------
     RecordingError
-        If the folder exists or cannot be made.
+        If the folder exists or cannot be made, or a place of shape (4, 4) is no rigid motion.
     """
 
-    def __init__(self, path: str | Path, *, lidar_mount: tuple[float, float, float] | None = None) -> None:
+    def __init__(self, path: str | Path, *, lidar_mount: ArrayLike | None = None, camera: Camera | None = None) -> None:
         from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
         self.path = Path(path)
+        self._places = _places(self.path, lidar_mount, camera)
+        self._model = None if camera is None else camera[0]
         if self.path.exists():
             raise RecordingError(f"{self.path}: exists already; remove it or choose another name")
         # Version 8 of the metadata is the latest that ROS 2 Humble reads, too.
@@ -52,7 +61,6 @@ class RecordingWriter:
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._encoder = Encoder()
         self._connections: dict[str, Any] = {}
-        self._mount = lidar_mount
         self._time = 0
         self._open = True
         try:
@@ -60,8 +68,8 @@ class RecordingWriter:
         except OSError as error:
             raise self._give_up(error) from error
 
-    def write(self, message: Message) -> None:
-        """Append a message.
+    def write(self, message: Message | Picture) -> None:
+        """Append a message or a picture.
 
         Raises
         ------
@@ -77,6 +85,11 @@ class RecordingWriter:
             elif isinstance(message, Odometry):
                 self._send("/odom", message.stamp, self._encoder.odometry(message.stamp, message.pose, _ODOM, _BASE))
                 self._send("/tf", message.stamp, self._encoder.transform(message.stamp, message.pose, _ODOM, _BASE))
+            elif isinstance(message, Picture):
+                self._send("/camera/image/compressed", message.stamp, self._encoder.picture(message, _CAMERA))
+                if self._model is not None:
+                    info = self._encoder.camera_info(message.stamp, self._model, _CAMERA)
+                    self._send("/camera/camera_info", message.stamp, info)
             else:
                 pose = self._encoder.odometry(message.stamp, message.pose, _WORLD, _BASE)
                 self._send("/ground_truth", message.stamp, pose)
@@ -121,9 +134,9 @@ class RecordingWriter:
     def _send(self, topic: str, stamp: float, message: Any) -> None:
         seconds, nanoseconds = split_stamp(stamp)
         self._time = max(self._time, seconds * 10**9 + nanoseconds)
-        if not self._connections and self._mount is not None:
-            mount = self._encoder.transform(stamp, np.array(self._mount), _BASE, _LASER)
-            self._writer.write(self._connection("/tf_static", mount), self._time, self._encoder.serialize(mount))
+        if not self._connections and self._places:
+            places = self._encoder.transforms(stamp, _BASE, self._places)
+            self._writer.write(self._connection("/tf_static", places), self._time, self._encoder.serialize(places))
         self._writer.write(self._connection(topic, message), self._time, self._encoder.serialize(message))
 
     def _connection(self, topic: str, message: Any) -> Any:
@@ -149,8 +162,26 @@ class RecordingWriter:
         return RecordingError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")
 
 
+def _places(path: Path, lidar_mount: ArrayLike | None, camera: Camera | None) -> dict[str, NDArray[np.float64]]:
+    """Places of the robot's parts in the base frame, by frame."""
+    places = {}
+    if lidar_mount is not None:
+        mount = np.asarray(lidar_mount, dtype=np.float64)
+        places[_LASER] = from_planar(mount) if mount.shape == (3,) else mount
+    if camera is not None:
+        places[_CAMERA] = np.asarray(camera[1], dtype=np.float64)
+    for frame, place in places.items():
+        if not is_rigid(place):
+            raise RecordingError(f"{path}: the place of {frame} on the robot is no rigid motion")
+    return places
+
+
 def write_recording(
-    path: str | Path, messages: Iterable[Message], *, lidar_mount: tuple[float, float, float] | None = None
+    path: str | Path,
+    messages: Iterable[Message | Picture],
+    *,
+    lidar_mount: ArrayLike | None = None,
+    camera: Camera | None = None,
 ) -> None:
     """Write messages as a recording, one by one as they come.
 
@@ -158,17 +189,17 @@ def write_recording(
     ----------
     path : str or Path
         Folder to make; it must not exist.
-    messages : iterable of LaserScan, Odometry or TruePose
+    messages : iterable of LaserScan, Odometry, TruePose or Picture
         In the order of recording.
-    lidar_mount : tuple of (float, float, float), optional
-        x (m), y (m), yaw (rad) of the lidar in the base frame.
+    lidar_mount, camera
+        As :class:`RecordingWriter` takes them.
 
     Raises
     ------
     RecordingError
         As :class:`RecordingWriter`.
     """
-    with RecordingWriter(path, lidar_mount=lidar_mount) as writer:
+    with RecordingWriter(path, lidar_mount=lidar_mount, camera=camera) as writer:
         for message in messages:
             writer.write(message)
 
