@@ -13,44 +13,40 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "robot"))  # the simulated lidar
-
-from x4_device import Device, square_room
-
 from contourslam.cli import main
 from contourslam.recordings import open_recording
 from contourslam.scan import LaserScan
+from contourslam.simulation.hardware.plugged_x4 import PluggedX4, square_room
 
 Failure = Callable[..., str]
 
 
 @pytest.fixture
-def device(tmp_path: Path) -> Iterator[Device]:
-    made = Device(tmp_path / "lidar")
-    yield made
-    made.close()
+def device(tmp_path: Path) -> Iterator[PluggedX4]:
+    with PluggedX4(tmp_path / "lidar") as made:
+        yield made
 
 
 def scans_of(path: Path) -> list[LaserScan]:
     return [message for message in open_recording(path).messages() if isinstance(message, LaserScan)]
 
 
-def test_lidar_says_what_it_sees(device: Device, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["lidar", "--port", str(device.path), "--seconds", "1", "--json"]) == 0
+def test_lidar_says_what_it_sees(device: PluggedX4, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lidar", "--port", str(device.line.path), "--seconds", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["rate"] == pytest.approx(7.0, rel=0.05)
     assert 300 < found["beams"] <= 714  # a busy machine loses some
     assert found["noise"] < 0.002
     assert found["checksum_rate"] > 0.9
     assert (found["model"], found["motor_line"], found["reconnections"]) == (6, False, 0)
-    assert main(["lidar", "--port", str(device.path), "--seconds", "0.4"]) == 0
+    assert main(["lidar", "--port", str(device.line.path), "--seconds", "0.4"]) == 0
     text = capsys.readouterr().out
     assert "X4, firmware 1.10" in text and "a second" in text and "\x1b" not in text
 
 
-def test_on_a_terminal_lidar_draws_the_room(device: Device) -> None:
+def test_on_a_terminal_lidar_draws_the_room(device: PluggedX4) -> None:
     master, slave = pty.openpty()
-    words = [sys.executable, "-m", "contourslam", "lidar", "--port", str(device.path), "--seconds", "0.9"]
+    words = [sys.executable, "-m", "contourslam", "lidar", "--port", str(device.line.path), "--seconds", "0.9"]
     environment = os.environ | {"COLUMNS": "80", "LINES": "24"}
     process = subprocess.Popen(words, stdout=slave, stderr=subprocess.DEVNULL, env=environment)
     os.close(slave)
@@ -68,27 +64,29 @@ def test_on_a_terminal_lidar_draws_the_room(device: Device) -> None:
 
 
 def test_record_writes_a_recording_of_the_room(
-    device: Device, tmp_path: Path, capsys: pytest.CaptureFixture[str], failure: Failure
+    device: PluggedX4, tmp_path: Path, capsys: pytest.CaptureFixture[str], failure: Failure
 ) -> None:
     bag = tmp_path / "bag"
-    assert main(["record", "-o", str(bag), "--port", str(device.path), "--seconds", "0.8", "--json"]) == 0
+    assert main(["record", "-o", str(bag), "--port", str(device.line.path), "--seconds", "0.8", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     scans = scans_of(bag)
     assert said["scans"] == len(scans) >= 1
     for scan in scans:
         hit = np.isfinite(scan.ranges)
         assert np.abs(scan.ranges[hit] - square_room(scan.angles[hit])).max() < 0.05
-    assert "there already" in failure("record", "-o", bag, "--port", device.path, "--seconds", "1")
+    assert "there already" in failure("record", "-o", bag, "--port", device.line.path, "--seconds", "1")
     device.unplug()
-    assert "no such port" in failure("record", "-o", bag, "--overwrite", "--port", device.path, "--seconds", "1")
+    assert "no such port" in failure("record", "-o", bag, "--overwrite", "--port", device.line.path, "--seconds", "1")
     assert len(scans_of(bag)) == len(scans)  # what stood there is still there
 
 
-def test_ctrl_c_and_a_lidar_that_goes_leave_a_whole_recording(device: Device, tmp_path: Path, failure: Failure) -> None:
-    words = [sys.executable, "-m", "contourslam", "record", "-o", str(tmp_path / "a"), "--port", str(device.path)]
+def test_ctrl_c_and_a_lidar_that_goes_leave_a_whole_recording(
+    device: PluggedX4, tmp_path: Path, failure: Failure
+) -> None:
+    words = [sys.executable, "-m", "contourslam", "record", "-o", str(tmp_path / "a"), "--port", str(device.line.path)]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     until = time.monotonic() + 10.0
-    while device.begun is None and time.monotonic() < until:
+    while device.lidar.begun is None and time.monotonic() < until:
         time.sleep(0.02)
     time.sleep(0.6)
     process.send_signal(signal.SIGINT)
@@ -97,7 +95,7 @@ def test_ctrl_c_and_a_lidar_that_goes_leave_a_whole_recording(device: Device, tm
     assert int(re.findall(r"(\d+) scans", said)[0]) == len(scans_of(tmp_path / "a")) >= 1
     timer = threading.Timer(0.6, device.unplug)
     timer.start()
-    said = failure("record", "-o", tmp_path / "b", "--port", device.path, "--patience", "0.2")
+    said = failure("record", "-o", tmp_path / "b", "--port", device.line.path, "--patience", "0.2")
     timer.join()
     assert "unplugged" in said
     assert len(scans_of(tmp_path / "b")) >= 1

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # the simulated lidar, x4_device
+from contourslam.simulation.hardware.plugged_x4 import PluggedX4
 
-from x4_device import Device
+sys.path.insert(0, str(Path(__file__).parent))  # the packets of a room, x4_device
 
 
 @pytest.fixture
-def device(tmp_path: Path) -> Iterator[Device]:
-    made = Device(tmp_path / "lidar")
-    yield made
-    made.close()
+def device(tmp_path: Path) -> Iterator[PluggedX4]:
+    with PluggedX4(tmp_path / "lidar") as made:
+        yield made

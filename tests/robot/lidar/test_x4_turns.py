@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from x4_device import BYTE, packets, square_room
+from x4_device import packets
 
 from contourslam.geometry.angles import wrap
 from contourslam.robot.lidar.even_beams import even_beams
@@ -12,6 +12,8 @@ from contourslam.robot.lidar.figures import LidarTally, polar_picture, range_noi
 from contourslam.robot.lidar.x4_packets import encode_packet
 from contourslam.robot.lidar.x4_turns import TurnAssembler
 from contourslam.scan import LaserScan
+from contourslam.simulation.hardware.plugged_x4 import square_room
+from contourslam.simulation.hardware.x4 import BYTE
 
 Damage = Callable[[bytes, np.random.Generator], bytes]
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from x4_device import HEALTH, Device, square_room
 
 from contourslam.errors import MissingExtraError
 from contourslam.robot import serial_port
@@ -23,13 +22,15 @@ from contourslam.robot.device_errors import (
     LidarStalledError,
 )
 from contourslam.robot.lidar.ydlidar_x4 import Health, YdlidarX4
+from contourslam.simulation.hardware.plugged_x4 import PluggedX4, square_room
+from contourslam.simulation.hardware.x4 import HEALTH
 
 
-def lidar_at(device: Device, *, timeout: float = 0.4, patience: float = 5.0) -> YdlidarX4:
-    return YdlidarX4(str(device.path), timeout=timeout, patience=patience)
+def lidar_at(device: PluggedX4, *, timeout: float = 0.4, patience: float = 5.0) -> YdlidarX4:
+    return YdlidarX4(str(device.line.path), timeout=timeout, patience=patience)
 
 
-def test_info_health_scans_and_the_end(device: Device) -> None:
+def test_info_health_scans_and_the_end(device: PluggedX4) -> None:
     with lidar_at(device) as lidar:
         info = lidar.info()
         assert (info.model, info.firmware, info.hardware) == (6, "1.10", 1)
@@ -37,19 +38,19 @@ def test_info_health_scans_and_the_end(device: Device) -> None:
         scans = list(islice(lidar.scans(), 4))
         assert not lidar.motor_line  # a pseudo-terminal has none
     until = time.monotonic() + 1.0
-    while device.scanning and time.monotonic() < until:
+    while device.lidar.scanning and time.monotonic() < until:
         time.sleep(0.01)
-    assert device.commands[-1] == 0x65 and not device.scanning
-    assert device.begun is not None
+    assert device.lidar.commands[-1] == 0x65 and not device.lidar.scanning
+    assert device.lidar.begun is not None
     for scan in scans:
         hit = np.isfinite(scan.ranges)
         assert np.abs(scan.ranges[hit] - square_room(scan.angles[hit])).max() < 0.03
-        late = (scan.stamp - device.begun) % (714 / 5000)
+        late = (scan.stamp - device.lidar.begun) % (714 / 5000)
         assert min(late, 714 / 5000 - late) < 0.03  # of a machine that may be busy
     assert scans[-1].ranges.size > 650
 
 
-def test_an_unplugged_lidar_is_waited_for(device: Device) -> None:
+def test_an_unplugged_lidar_is_waited_for(device: PluggedX4) -> None:
     with lidar_at(device) as lidar:
         scans = lidar.scans()
         next(scans)
@@ -62,7 +63,7 @@ def test_an_unplugged_lidar_is_waited_for(device: Device) -> None:
         assert next(scans).stamp > first.stamp
 
 
-def test_a_lidar_that_stays_away_is_given_up(device: Device) -> None:
+def test_a_lidar_that_stays_away_is_given_up(device: PluggedX4) -> None:
     with lidar_at(device, patience=0.3) as lidar:
         scans = lidar.scans()
         next(scans)
@@ -71,7 +72,7 @@ def test_a_lidar_that_stays_away_is_given_up(device: Device) -> None:
             next(scans)
 
 
-def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device: Device) -> None:
+def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device: PluggedX4) -> None:
     with lidar_at(device, timeout=0.2) as lidar:
         with pytest.raises(DevicePowerError, match="supply dips"):
             for _ in lidar.scans():
@@ -79,64 +80,64 @@ def test_a_lidar_that_starts_anew_is_told_again_to_scan_but_not_for_ever(device:
         assert lidar.restarts == 4
 
 
-def test_silence_is_told(device: Device) -> None:
-    device.deaf = True
+def test_silence_is_told(device: PluggedX4) -> None:
+    device.lidar.deaf = True
     with lidar_at(device, timeout=0.2) as lidar, pytest.raises(DeviceSilentError, match=r"no data within .* power"):
         next(lidar.scans())
 
 
-def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: Device) -> None:
-    device.silent = True
+def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: PluggedX4) -> None:
+    device.lidar.silent = True
     with lidar_at(device, timeout=0.2) as lidar, pytest.raises(DeviceSilentError, match="no data"):
         next(lidar.scans())
-    assert device.commands.count(0x60) == 4
+    assert device.lidar.commands.count(0x60) == 4
 
 
-def test_nonsense_is_a_wrong_speed(device: Device) -> None:
+def test_nonsense_is_a_wrong_speed(device: PluggedX4) -> None:
     device.garbage = True
     with lidar_at(device) as lidar, pytest.raises(DeviceBaudError, match="none make sense; the X4 has 128000 baud"):
         lidar.info()
 
 
-def test_a_head_that_stands_still_is_told(device: Device) -> None:
-    device.stalled = True
+def test_a_head_that_stands_still_is_told(device: PluggedX4) -> None:
+    device.lidar.stalled = True
     with lidar_at(device, timeout=0.3) as lidar, pytest.raises(LidarStalledError, match="motor"):
         next(lidar.scans())
 
 
-def test_a_line_on_which_nothing_passes_any_more_is_told(device: Device) -> None:
+def test_a_line_on_which_nothing_passes_any_more_is_told(device: PluggedX4) -> None:
     with lidar_at(device, timeout=0.2) as lidar:
         scans = lidar.scans()
         next(scans)
-        device.damage = 0.7
+        device.damage(0.7)
         with pytest.raises(DeviceNoisyError, match=r"\d% of the last packets fail .* cable"):
             for _ in scans:
                 pass
 
 
-def test_a_line_that_lets_hardly_anything_pass_is_told_with_the_rate(device: Device) -> None:
+def test_a_line_that_lets_hardly_anything_pass_is_told_with_the_rate(device: PluggedX4) -> None:
     with lidar_at(device, timeout=0.15) as lidar:
         scans = lidar.scans()
         next(scans)
-        device.damage = 0.12
+        device.damage(0.12)
         with pytest.raises(DeviceNoisyError, match=r"\d% of the last packets fail"):
             for _ in scans:
                 pass
 
 
-def test_a_fault_of_the_lidar_is_told(device: Device) -> None:
-    device.health = HEALTH[:7] + bytes([2, 7, 0])
+def test_a_fault_of_the_lidar_is_told(device: PluggedX4) -> None:
+    device.lidar.health = HEALTH[:7] + bytes([2, 7, 0])
     with lidar_at(device) as lidar, pytest.raises(DeviceFaultError, match="fault 7"):
         lidar.start()
 
 
-def test_scans_end_when_asked(device: Device) -> None:
+def test_scans_end_when_asked(device: PluggedX4) -> None:
     with lidar_at(device) as lidar:
         until = time.monotonic() + 0.3
         assert len(list(lidar.scans(lambda: time.monotonic() > until))) <= 3
 
 
-def test_two_programs_do_not_share_a_lidar(device: Device) -> None:
+def test_two_programs_do_not_share_a_lidar(device: PluggedX4) -> None:
     with lidar_at(device), pytest.raises(DeviceBusyError, match="another program holds the port"):
         lidar_at(device)
 
