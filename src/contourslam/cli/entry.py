@@ -25,6 +25,7 @@ COMMANDS = {
     "world": "Write a simulated room as a world of Gazebo.",
     "lidar": "Look at a YDLidar X4 on a serial port.",
     "record": "Record the scans of a YDLidar X4.",
+    "calibrate": "Find out how a robot is built: the camera's lens and place.",
     "warm-up": "Compile everything before the robot drives.",
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""
