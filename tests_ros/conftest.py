@@ -115,6 +115,14 @@ def processes(compiled: None, recording: Path, tmp_path_factory: pytest.TempPath
 
 
 @pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    """Nodes of the robot's parts, which map nothing and so have nothing to compile."""
+    made = Processes(Path(), tmp_path_factory.mktemp("parts"))
+    yield made
+    made.end()
+
+
+@pytest.fixture(scope="module")
 def observe(ros: None) -> Iterator[Callable[[str], Observer]]:
     """Listen to what a robot's node publishes."""
     observers: list[Observer] = []

@@ -18,6 +18,7 @@ from contourslam_ros.settings import NodeConfig
 PACKAGE = Path(__file__).parents[1] / "ros2" / "contourslam_ros"
 MESSAGES = PACKAGE.with_name("contourslam_msgs")
 LAUNCHES = {"mapping": "slam", "localization": "localization", "replay": "replay"}
+PARTS = ("lidar",)
 NAMES = {
     "launch": ["LaunchDescription"],
     "launch.actions": ["DeclareLaunchArgument"],
@@ -72,7 +73,7 @@ def test_nodes_and_what_they_need_are_where_ros_looks_for_them(installed: Path) 
         names = {path.name for path in (PACKAGE / folder).iterdir() if path.is_file()}
         assert names == {path.name for path in (share / folder).iterdir()}
     programs = {path.name for path in (installed / "lib" / "contourslam_ros").iterdir()}
-    assert programs == set(LAUNCHES.values())
+    assert programs == {*LAUNCHES.values(), *PARTS}
 
 
 @pytest.mark.parametrize("name", LAUNCHES)

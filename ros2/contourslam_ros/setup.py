@@ -35,6 +35,7 @@ setup(
             f"slam = {NAME}.slam:main",
             f"localization = {NAME}.localization:main",
             f"replay = {NAME}.replay:main",
+            f"lidar = {NAME}.lidar:main",
         ]
     },
 )

@@ -80,6 +80,7 @@ class LiveNode(Node):
 
     def warm_up(self) -> None:
         """Have everything that the node may do done once before the first scan comes, so that it is compiled."""
+        self.get_logger().info("warming up, which takes minutes when it is the first time on this machine")
         with tempfile.TemporaryDirectory() as folder:
             work = dict(stages(Path(folder)))
             for name in self.rehearsed:
@@ -107,6 +108,7 @@ class LiveNode(Node):
             self.create_timer(self.config.tf_period, self._send_transform, clock=steady)
         Services(self, self.running, self.config.map_file)
         self._sensors.listen()
+        self.get_logger().info(f"ready: waiting for {' and '.join(self.topics.values())}")
 
     def stop(self) -> None:
         """End the session: what is to be saved by itself is saved."""

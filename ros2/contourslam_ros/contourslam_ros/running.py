@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from typing import Any, Protocol
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -12,10 +13,33 @@ from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from contourslam.errors import ContourslamError
-from contourslam_ros.live_node import LiveNode
 
 
-def run(make: Callable[[], LiveNode]) -> int:
+class Living(Protocol):
+    """A node that can be run.
+
+    Attributes
+    ----------
+    failure : BaseException or None
+        Why it cannot go on.
+    """
+
+    failure: BaseException | None
+
+    def warm_up(self) -> None:
+        """Do what takes long and needs no message."""
+
+    def start(self) -> None:
+        """Publish and subscribe."""
+
+    def stop(self) -> None:
+        """End what was begun."""
+
+    def destroy_node(self) -> Any:
+        """Leave ROS."""
+
+
+def run(make: Callable[[], Living]) -> int:
     """Run a node; give the exit code: 0 where it was told to stop, 1 where it could not go on."""
     # No exception in the midst of anything: what is being done is done, the map is saved, then the node ends.
     told = threading.Event()
@@ -25,11 +49,9 @@ def run(make: Callable[[], LiveNode]) -> int:
     node = None
     try:
         node = make()
-        node.get_logger().info("warming up, which takes minutes when it is the first time on this machine")
         node.warm_up()
         gc.freeze()  # what stays is not looked through again: that would hold up a scan for a tenth of a second
         node.start()
-        node.get_logger().info(f"ready: waiting for {' and '.join(node.topics.values())}")
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not told.is_set() and node.failure is None:

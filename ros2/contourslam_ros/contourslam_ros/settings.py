@@ -93,17 +93,32 @@ def declared(node: "Node") -> Settings:
     """
     defaults = Settings()
     return Settings(**{
-        name: _declared(node, getattr(defaults, name), prefix) for name, prefix in _PREFIXES.items()
+        name: declare(node, getattr(defaults, name), prefix) for name, prefix in _PREFIXES.items()
     })  # fmt: skip
 
 
-def _declared(node: "Node", default: T, prefix: str) -> T:
+def declare(node: "Node", default: T, prefix: str = "") -> T:
+    """Declare the fields of a configuration as parameters of a node, and read them.
+
+    Parameters
+    ----------
+    node : Node
+    default : dataclass
+        Its values are the defaults, and the strings after its fields what they mean.
+    prefix : str
+        Before each name.
+
+    Raises
+    ------
+    ConfigError
+        If a value is of the wrong type or out of range; the message names it.
+    """
     from rcl_interfaces.msg import ParameterDescriptor
 
     values: dict[str, Any] = {}
     for name, value, meaning in _fields(default):
         if dataclasses.is_dataclass(value):
-            values[name] = _declared(node, value, f"{prefix}{name}.")
+            values[name] = declare(node, value, f"{prefix}{name}.")
             continue
         # Numbers are read by hand, for ROS takes 1 for no float; and nothing can be changed while a map is being made.
         descriptor = ParameterDescriptor(description=meaning, read_only=True, dynamic_typing=True)
