@@ -75,7 +75,7 @@ def cast_scans(
         if stamp + offsets[-1] > end:
             break
         origins, directions = _beams(drive, lidar, stamp + offsets, angles)
-        ranges, incidences = _cast(mujoco, model, data, origins, directions)
+        ranges, incidences = cast_rays(mujoco, model, data, origins, directions)
         scans.append(IdealScan(stamp, angles, offsets, ranges, incidences))
         if progress is not None:
             progress(min(stamp / end, 1.0))
@@ -124,8 +124,16 @@ def _beams(drive: Drive, lidar: LidarModel, times: Floats, angles: Floats) -> tu
     return position + axes @ mount, directions
 
 
-def _cast(mujoco: Any, model: Any, data: Any, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """Range (m) and incidence (rad) of each beam."""
+def cast_rays(mujoco: Any, model: Any, data: Any, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
+    """Range (m; inf where it meets nothing) and incidence (rad) of rays in a compiled world.
+
+    Parameters
+    ----------
+    mujoco : module
+    model, data : MjModel, MjData
+    origins, directions : ndarray, shape (n, 3)
+        World frame, m; directions of unit length.
+    """
     # One call a beam: casting many at once (mj_multiRay) would make all of them start at one point.
     ray, count = mujoco.mj_ray, len(origins)
     normals = np.zeros((count, 3))
