@@ -26,10 +26,11 @@ pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
 from contourslam.graph import GraphSlam, kept
+from contourslam.robot.route import sample_route
 from contourslam.simulation.buildings import Building
 from contourslam.simulation.chance import FLAWS, stream
 from contourslam.simulation.config import LidarModel
-from contourslam.simulation.follower import Habits, sample_route
+from contourslam.simulation.follower import Habits
 from contourslam.simulation.gliding import Tick, glide
 from contourslam.simulation.long_drive import LongDrive
 from contourslam.simulation.pieces import Box

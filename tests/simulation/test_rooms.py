@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contourslam.geometry.angles import wrap
-from contourslam.simulation.follower import sample_route
+from contourslam.robot.route import sample_route
 from contourslam.simulation.rooms import ROOMS
 
 BODY_HEIGHTS = (0.02, 0.1, 0.2, 0.25)

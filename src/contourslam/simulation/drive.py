@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
 from contourslam.geometry.poses import interpolate
+from contourslam.robot.route import sample_route
 from contourslam.simulation.chance import DRIVER, stream
 from contourslam.simulation.config import RobotModel
-from contourslam.simulation.follower import Follower, Habits, sample_route
+from contourslam.simulation.follower import Follower, Habits
 from contourslam.simulation.mjcf import import_mujoco
 from contourslam.simulation.robot import draw_flaws
 from contourslam.simulation.room import Room

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.poses import compose_one
-from contourslam.simulation.follower import ACCELERATION, TURN_ACCELERATION, Habits, gently, wanted_twist
+from contourslam.robot.route import gently, wanted_twist
+from contourslam.simulation.follower import ACCELERATION, TURN_ACCELERATION, Habits
 
 Floats = NDArray[np.float64]
 TICK = 0.05  # s: 20 Hz
