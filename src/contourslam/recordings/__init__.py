@@ -1,5 +1,6 @@
 """Reading and writing of recordings, trajectories and relations; everything is checked, nothing is held whole."""
 
+from contourslam.recordings.base_readings import BaseReading, InertialReading, WheelReading
 from contourslam.recordings.opening import open_recording
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.recording import Camera, Message, Recording, Topic
@@ -8,12 +9,15 @@ from contourslam.recordings.trajectories import read_trajectory, write_trajector
 from contourslam.recordings.writer import RecordingWriter, write_recording
 
 __all__ = [
+    "BaseReading",
     "Camera",
+    "InertialReading",
     "Message",
     "Picture",
     "Recording",
     "RecordingWriter",
     "Topic",
+    "WheelReading",
     "open_recording",
     "read_relations",
     "read_trajectory",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.recordings.base_readings import WheelReading
 from contourslam.recordings.picture import Picture
 from contourslam.scan import LaserScan, Odometry, TruePose
 
@@ -56,6 +57,8 @@ class Recording(ABC):
         first, and how many.
     skipped_pictures : dict of str to int
         The same of the latest pass of :meth:`pictures`.
+    skipped_wheels : dict of str to int
+        The same of the latest pass of :meth:`wheel_readings`.
     notes : list of str
         What is worth knowing about the recording and changes nothing in how it is read.
     """
@@ -66,6 +69,7 @@ class Recording(ABC):
         self.T_base_lidar: NDArray[np.float64] | None = None
         self.skipped: dict[str, int] = {}
         self.skipped_pictures: dict[str, int] = {}
+        self.skipped_wheels: dict[str, int] = {}
         self.notes: list[str] = []
 
     @abstractmethod
@@ -98,6 +102,18 @@ class Recording(ABC):
         ------
         RecordingError
             If the choice of the topic is not clear, and where the recording is damaged or cut short.
+        """
+        return iter(())
+
+    def wheel_readings(self) -> Iterator[WheelReading]:
+        """Yield the angles of the wheels in the order of the recording, where it has any (``sensor_msgs/JointState``).
+
+        One that cannot be used is skipped and counted. Each call starts a new pass.
+
+        Raises
+        ------
+        RecordingError
+            Where the recording is damaged or cut short.
         """
         return iter(())
 

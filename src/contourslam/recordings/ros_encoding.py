@@ -9,6 +9,7 @@ import numpy as np
 from contourslam.errors import RecordingError
 from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.geometry.rigid import from_planar, quaternion
+from contourslam.recordings.base_readings import InertialReading, WheelReading
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.ros_messages import OMNIDIRECTIONAL, standard_types
 from contourslam.scan import LaserScan
@@ -29,7 +30,7 @@ class Encoder:
         """Serialize a message as CDR."""
         return bytes(self.store.serialize_cdr(message, message.__msgtype__))
 
-    def _make(self, name: str, **fields: Any) -> Any:
+    def _make(self, name: str, /, **fields: Any) -> Any:
         return self._types[name](**fields)
 
     def header(self, stamp: float, frame: str) -> Any:
@@ -140,6 +141,34 @@ class Encoder:
             binning_y=0,
             roi=region,
         )
+
+    def wheels(self, reading: WheelReading, frame: str) -> Any:
+        """Build a ``JointState`` message."""
+        return self._make(
+            "sensor_msgs/msg/JointState",
+            header=self.header(reading.stamp, frame),
+            name=["left_wheel", "right_wheel"],
+            position=np.array(reading.angles),
+            velocity=np.array(reading.speeds),
+            effort=np.empty(0),
+        )
+
+    def inertial(self, reading: InertialReading, frame: str) -> Any:
+        """Build an ``Imu`` message, which says that it knows no orientation."""
+        unknown = np.zeros(9)
+        return self._make(
+            "sensor_msgs/msg/Imu",
+            header=self.header(reading.stamp, frame),
+            orientation=self._rotation(0.0),
+            orientation_covariance=np.array([-1.0, *unknown[1:]]),
+            angular_velocity=self._vector(reading.gyro),
+            angular_velocity_covariance=unknown,
+            linear_acceleration=self._vector(reading.acceleration),
+            linear_acceleration_covariance=unknown,
+        )
+
+    def _vector(self, values: tuple[float, float, float]) -> Any:
+        return self._make("geometry_msgs/msg/Vector3", **dict(zip("xyz", map(float, values), strict=True)))
 
     def _rotation(self, heading: float) -> Any:
         half = 0.5 * heading

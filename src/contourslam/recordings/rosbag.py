@@ -9,6 +9,8 @@ from typing import Any
 
 from contourslam.errors import RecordingError, ScanError
 from contourslam.recordings.bag_pictures import BagPictures
+from contourslam.recordings.bag_wheels import read_wheels
+from contourslam.recordings.base_readings import WheelReading
 from contourslam.recordings.mount import FrameTree, Mount
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.recording import Camera, Message, Recording, SkipCount, Topic
@@ -88,6 +90,10 @@ class BagRecording(Recording):
     def pictures(self, topic: str | None = None) -> Iterator[Picture]:
         """See :meth:`Recording.pictures`."""
         return self._pictures.read(topic)
+
+    def wheel_readings(self) -> Iterator[WheelReading]:
+        """See :meth:`Recording.wheel_readings`."""
+        return read_wheels(self._storage, self.skipped_wheels)
 
     @cached_property
     def camera(self) -> Camera | None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contourslam.errors import RecordingError
 from contourslam.geometry.rigid import from_planar, is_rigid
+from contourslam.recordings.base_readings import BaseReading, InertialReading, WheelReading
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.recording import Camera, Message
 from contourslam.recordings.ros_encoding import Encoder, split_stamp
@@ -25,9 +26,10 @@ class RecordingWriter:
 
     Scans go to ``/scan`` (frame ``laser``), odometry to ``/odom`` and ``/tf`` (odom to base_link), true poses to
     ``/ground_truth`` (frame ``map``), pictures to ``/camera/image/compressed`` (frame ``camera_optical``), each with
-    the camera's model in ``/camera/camera_info``, the places of lidar and camera to ``/tf_static``. A message is
-    recorded at its stamp, a scan at the time of its last beam, and never before the message before it, so that their
-    order is kept.
+    the camera's model in ``/camera/camera_info``, the places of lidar and camera to ``/tf_static``, angles of the
+    wheels to ``/joint_states``, and the inertial sensors to ``/imu/data`` (frame ``base_link``). A message is recorded
+    at its stamp, a scan at the time of its last beam, and never before the message before it, so that their order is
+    kept.
 
     When the block is left by an exception, Ctrl-C among them, what was written is closed properly and kept. When the
     writing itself fails, for a full disk say, what was written is kept under another name, ``<path>.partial``, which
@@ -68,8 +70,8 @@ class RecordingWriter:
         except OSError as error:
             raise self._give_up(error) from error
 
-    def write(self, message: Message | Picture) -> None:
-        """Append a message or a picture.
+    def write(self, message: Message | Picture | BaseReading) -> None:
+        """Append a message, a picture or a reading of the base.
 
         Raises
         ------
@@ -90,6 +92,10 @@ class RecordingWriter:
                 if self._model is not None:
                     info = self._encoder.camera_info(message.stamp, self._model, _CAMERA)
                     self._send("/camera/camera_info", message.stamp, info)
+            elif isinstance(message, WheelReading):
+                self._send("/joint_states", message.stamp, self._encoder.wheels(message, _BASE))
+            elif isinstance(message, InertialReading):
+                self._send("/imu/data", message.stamp, self._encoder.inertial(message, _BASE))
             else:
                 pose = self._encoder.odometry(message.stamp, message.pose, _WORLD, _BASE)
                 self._send("/ground_truth", message.stamp, pose)
@@ -178,7 +184,7 @@ def _places(path: Path, lidar_mount: ArrayLike | None, camera: Camera | None) ->
 
 def write_recording(
     path: str | Path,
-    messages: Iterable[Message | Picture],
+    messages: Iterable[Message | Picture | BaseReading],
     *,
     lidar_mount: ArrayLike | None = None,
     camera: Camera | None = None,
@@ -189,7 +195,7 @@ def write_recording(
     ----------
     path : str or Path
         Folder to make; it must not exist.
-    messages : iterable of LaserScan, Odometry, TruePose or Picture
+    messages : iterable of LaserScan, Odometry, TruePose, Picture or BaseReading
         In the order of recording.
     lidar_mount, camera
         As :class:`RecordingWriter` takes them.
