@@ -1,5 +1,7 @@
 """What the launch files of mapping and localisation start alike: a node in a map file, and RViz if wanted."""
 
+from typing import Any
+
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
@@ -13,7 +15,7 @@ PARAMETERS = PathJoinSubstitution([SHARE, "config", "parameters.yaml"])
 PICTURE = PathJoinSubstitution([SHARE, "rviz", "contourslam.rviz"])
 
 
-def node_and_rviz(executable: str, map_file: DeclareLaunchArgument) -> LaunchDescription:
+def node_and_rviz(executable: str, map_file: DeclareLaunchArgument, *more: Any) -> LaunchDescription:
     """Say what is started.
 
     Parameters
@@ -22,6 +24,8 @@ def node_and_rviz(executable: str, map_file: DeclareLaunchArgument) -> LaunchDes
         The node: ``slam`` or ``localization``.
     map_file : DeclareLaunchArgument
         What the map file is to it, and whether it must be given.
+    *more
+        What else is declared and started.
     """
     simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
     return LaunchDescription(
@@ -59,5 +63,6 @@ def node_and_rviz(executable: str, map_file: DeclareLaunchArgument) -> LaunchDes
                 parameters=[{"use_sim_time": simulated}],
                 condition=IfCondition(LaunchConfiguration("rviz")),
             ),
+            *more,
         ]
     )

@@ -1,6 +1,5 @@
 """Node ``lidar``: the scans of a YDLidar X4."""
 
-import math
 import sys
 import threading
 import time
@@ -10,6 +9,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import LaserScan as ScanMessage
 from std_srvs.srv import Trigger
 
+from contourslam.geometry.rigid import from_planar
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.robot.lidar.even_beams import even_beams
 from contourslam.robot.lidar.figures import LidarTally
@@ -50,9 +50,7 @@ class Lidar(DeviceNode):
         super().start()
         if self._config.place_from_file:
             base, laser = self._config.named(self._config.base_frame), self._config.named(self._config.frame)
-            x, y, yaw = self._part.mount
-            turn = (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
-            self.place(place_message(base, laser, (x, y, self._part.height), turn))
+            self.place(place_message(base, laser, from_planar(self._part.mount, self._part.height)))
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Publish a scan for each turn while they are wanted."""
