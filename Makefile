@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ros bench bench-scale bench-ros check clean
+.PHONY: help demo test test-ros firmware test-firmware bench bench-scale bench-ros check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
 
 help: ## List the targets.
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, write the report to demo/ (minutes).
 	$(BIN)/contourslam compare --room furnished_room --seeds 3 --jobs 2 --output demo --overwrite
@@ -26,6 +26,12 @@ test: $(VENV)/.dev ## Run the tests.
 
 test-ros: $(VENV_ROS)/.ready ## Run the ROS 2 nodes against real rclpy, in an environment of its own (needs a C++ compiler).
 	$(VENV_ROS)/bin/python -m pytest tests_ros
+
+firmware: ## Build the Mega's firmware and the simulated board that runs it (needs arduino-core-avr, libsimavr-dev, libelf-dev).
+	$(MAKE) -C firmware/mega all board
+
+test-firmware: $(VENV)/.dev firmware ## Run the firmware's tests on the simulated board; minutes.
+	$(BIN)/python -m pytest -n auto --dist worksteal firmware/mega/tests
 
 check: $(VENV)/.dev ## Lint, check the format and the types.
 	$(BIN)/ruff check
@@ -42,8 +48,8 @@ bench-ros: $(VENV_ROS)/.ready ## Measure the ROS 2 node beside a robot that is p
 	$(VENV_ROS)/bin/python benchmarks/bench_ros.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
-	rm -rf $(VENV) $(VENV_ROS) .venv-peers demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find src tests tests_ros ros2 examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf $(VENV) $(VENV_ROS) .venv-peers firmware/mega/build demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests tests_ros ros2 firmware examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or give it: make PYTHON=/path/to/python3.11" >&2; exit 1; }
