@@ -2,9 +2,9 @@
 
 import numpy as np
 
-FLAWS, DRIVER, ODOMETRY, TURN_RATE, NOISE = range(5)
+FLAWS, DRIVER, ODOMETRY, TURN_RATE, NOISE, LOOKS, CAMERA = range(7)
 
 
 def stream(seed: int, source: int) -> np.random.Generator:
-    """Return the generator of one source of chance (``FLAWS`` ... ``NOISE``) in the run with this seed."""
+    """Return the generator of one source of chance (``FLAWS`` ... ``CAMERA``) in the run with this seed."""
     return np.random.default_rng([seed, source])

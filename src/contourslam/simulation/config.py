@@ -3,7 +3,11 @@
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contourslam.errors import ConfigError
+from contourslam.geometry.fisheye import FisheyeModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +96,62 @@ YDLIDAR_X4 = LidarModel(
 """YDLidar X4: 5,000 samples/s at about 7 turns/s, so 420 to 830 beams; noise 1 cm, 0.5 % beyond 2 m; drop-outs."""
 
 LIDARS: dict[str, LidarModel] = {"paper": PAPER_LIDAR, "ydlidar_x4": YDLIDAR_X4}
+
+
+RASPBERRY_PI_FISHEYE = FisheyeModel(640, 640, 1.6, 422.0, 421.4, 0.2, 321.3, 318.2, -0.012, 0.002, 0.0004, -0.0003)
+"""A 220 degree lens on a Raspberry Pi's 5 megapixel sensor, of which the middle is read out four pixels into one."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraModel:
+    """A fisheye camera on the robot."""
+
+    model: FisheyeModel = RASPBERRY_PI_FISHEYE
+    """Which pixel sees which ray."""
+    x: float = 0.14
+    """Ahead of the axle, m."""
+    y: float = 0.0
+    """To the left, m."""
+    height: float = 0.30
+    """Above the floor, m."""
+    tilt_deg: float = 10.0
+    """Of the lens above the horizon, degrees."""
+    rate: float = 2.0
+    """Pictures per second."""
+    noise: float = 2.0
+    """Standard deviation of a pixel's noise, of 255."""
+    vignetting: float = 0.25
+    """How much darker the picture is at the edge of the view, as a fraction."""
+    exposure_wander: float = 0.12
+    """How far the automatic exposure wanders, as a fraction."""
+    jpeg_quality: int = 90
+    """1 to 95."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("rate", 1e-3, 60.0), ("noise", 0.0, 255.0), ("vignetting", 0.0, 1.0), ("exposure_wander", 0.0, 1.0),
+            ("jpeg_quality", 1, 95), ("tilt_deg", -90.0, 90.0), ("height", 0.0, 10.0), ("x", -1.0, 1.0),
+            ("y", -1.0, 1.0),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigError(f"CameraModel.{name} must lie between {low:g} and {high:g}, got {value!r}")
+
+    @property
+    def mount(self) -> NDArray[np.float64]:
+        """T_base_camera: pose of the lens in the base frame, whose origin is on the floor, shape (4, 4)."""
+        tilt = math.radians(self.tilt_deg)
+        cos, sin = math.cos(tilt), math.sin(tilt)
+        right, down, ahead = (0.0, -1.0, 0.0), (sin, 0.0, -cos), (cos, 0.0, sin)
+        found = np.eye(4)
+        found[:3, :3] = np.array([right, down, ahead]).T
+        found[:3, 3] = self.x, self.y, self.height
+        return found
+
+    @property
+    def face_pixels(self) -> int:
+        """Pixels along a whole face of the cube that is drawn: a little more than the picture's middle shows."""
+        return 2 * math.ceil(1.25 * max(self.model.fx, self.model.fy) / (1.0 + self.model.xi))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,6 @@
 """A 3-D picture of a room, seen from above like a doll's house (the paper's Fig. 4)."""
 
 import math
-import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 from contourslam.errors import MissingExtraError, ResultError
 from contourslam.simulation.config import RobotModel
 from contourslam.simulation.mjcf import import_mujoco
+from contourslam.simulation.offscreen import drawing_errors, open_context
 from contourslam.simulation.robot import draw_flaws
 from contourslam.simulation.room import Room
 from contourslam.simulation.world import compile_world
@@ -49,18 +48,13 @@ def render_room(room: Room, path: Path, *, width: int = 1280, height: int = 860,
     camera = _camera(mujoco, room, width / height, azimuth_deg)
     try:
         imsave(path, _draw(mujoco, model, camera, width, height))
-    except (ImportError, AttributeError, OSError, RuntimeError, ValueError, mujoco.FatalError) as error:
+    except drawing_errors(mujoco) as error:
         raise ResultError(f"no picture of room {room.name} in {path}: {error}; try MUJOCO_GL=osmesa") from error
 
 
 def _draw(mujoco: Any, model: Any, camera: Any, width: int, height: int) -> NDArray[np.uint8]:
     """Draw without a window, shape (height, width, 3)."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY") and not os.environ.get("MUJOCO_GL"):
-        # mujoco.Renderer would take the window system that was chosen when MuJoCo was imported; here is none.
-        from mujoco.egl import GLContext
-    else:
-        from mujoco import GLContext
-    window = GLContext(width, height)
+    window = open_context(width, height)
     try:
         window.make_current()
         data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=2 * model.ngeom + 100)
