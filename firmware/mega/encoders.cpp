@@ -29,7 +29,7 @@ volatile bool skipped;
 const int8_t STEP[16] = {0, -1, 1, 2, 1, 0, 2, -1, -1, 2, 0, 1, 2, 1, -1, 0};
 
 template <uint8_t A, uint8_t B>
-inline uint8_t channels() {
+inline __attribute__((always_inline)) uint8_t channels() {
   uint8_t port = on_port_d(A) ? PIND : PINE;
   uint8_t state = 0;
   if (port & _BV(bit_of(A))) state |= 2;
@@ -38,16 +38,16 @@ inline uint8_t channels() {
 }
 
 template <Side side>
-inline uint8_t channels_of() {
+inline __attribute__((always_inline)) uint8_t channels_of() {
   return side == LEFT ? channels<ENCODER_LEFT_A, ENCODER_LEFT_B>() : channels<ENCODER_RIGHT_A, ENCODER_RIGHT_B>();
 }
 
 template <Side side>
-inline void edge() {
+inline __attribute__((always_inline)) void edge() {
   constexpr int8_t sign = side == LEFT ? ENCODER_LEFT_SIGN : ENCODER_RIGHT_SIGN;
   Wheel &wheel = wheels[side];
   uint8_t state = channels_of<side>();
-  int8_t step = STEP[wheel.state << 2 | state];
+  int8_t step = STEP[(uint8_t)(wheel.state << 2) | state];
   // The other channel's interrupt has seen this edge already.
   if (step == 0) return;
   wheel.state = state;
@@ -97,6 +97,6 @@ bool impossible_step() {
 constexpr Side PORT_D = encoders::on_port_d(ENCODER_LEFT_A) ? LEFT : RIGHT;
 constexpr Side PORT_E = PORT_D == LEFT ? RIGHT : LEFT;
 ISR(INT2_vect) { encoders::edge<PORT_D>(); }
-ISR(INT3_vect) { encoders::edge<PORT_D>(); }
+ISR(INT3_vect, ISR_ALIASOF(INT2_vect));
 ISR(INT4_vect) { encoders::edge<PORT_E>(); }
-ISR(INT5_vect) { encoders::edge<PORT_E>(); }
+ISR(INT5_vect, ISR_ALIASOF(INT4_vect));

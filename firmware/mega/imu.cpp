@@ -53,7 +53,7 @@ enum class Asked : uint8_t { NOTHING, STEP, MOTION, FIELD };
 
 At at;
 Asked asked;
-uint8_t step, wait, failures, compass_failures, compass_due;
+uint8_t step, wait, late, failures, compass_failures, compass_due;
 Kind found;
 bool compass_runs;
 
@@ -147,9 +147,13 @@ void compass_read(bool done) {
 }  // namespace
 
 void tick() {
-  poll();
   if (compass_due) compass_due--;
-  if (asked != Asked::NOTHING) return;
+  if (asked != Asked::NOTHING) {
+    // Two periods are twenty times what a transfer needs.
+    if (++late == 2) twi::give_up();
+    return;
+  }
+  late = 0;
   if (wait) {
     wait--;
   } else if (at == At::STARTING) {
@@ -163,13 +167,13 @@ void tick() {
   }
 }
 
+bool waiting() { return asked != Asked::NOTHING && twi::status() != twi::BUSY; }
+
 void poll() {
-  if (asked == Asked::NOTHING) return;
-  twi::Status status = twi::status();
-  if (status == twi::BUSY) return;
+  if (!waiting()) return;
   Asked was = asked;
   asked = Asked::NOTHING;
-  bool done = status == twi::DONE;
+  bool done = twi::status() == twi::DONE;
   if (was == Asked::STEP) stepped(done);
   if (was == Asked::MOTION) moved(done);
   if (was == Asked::FIELD) compass_read(done);

@@ -14,8 +14,9 @@ struct Reading {
 
 // Once a period.
 void tick();
-// As often as the loop goes round.
+// When a transfer has ended.
 void poll();
+bool waiting();
 
 // The mean since the last call, and the newest of the compass.
 Reading read();

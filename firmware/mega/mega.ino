@@ -36,13 +36,14 @@ void loop() {
   }
   imu::poll();
 
-  // Until the next interrupt there is nothing to do. What came just now is seen before, not after, the sleep.
+  // Until there is something to do. What comes just now is seen before, not after, the sleep.
   cli();
-  if (!ticker::waiting() && !link::waiting()) {
+  while (!ticker::waiting() && !link::waiting() && !imu::waiting()) {
     sleep_enable();
     sei();
     sleep_cpu();
     sleep_disable();
+    cli();
   }
   sei();
 }

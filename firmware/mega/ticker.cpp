@@ -16,8 +16,9 @@ uint8_t latched_period;
 }  // namespace
 
 void begin() {
-  // The Arduino core's clock (millis, delay) is not used, and would only interrupt.
+  // What the Arduino core has started and nobody here uses, its clock (millis, delay) among it.
   TIMSK0 = 0;
+  TCCR0B = TCCR1B = TCCR2B = 0;
   TCCR3A = 0;
   TCCR3B = 0;
   TCNT3 = 0;

@@ -25,7 +25,7 @@ bool waiting();
 uint32_t now();
 
 // The period that is running, modulo 256, and the half microseconds of it; interrupts must be off.
-inline void stamp(uint8_t &period, uint16_t &halves) {
+inline __attribute__((always_inline)) void stamp(uint8_t &period, uint16_t &halves) {
   extern volatile uint8_t periods;
   uint16_t count = TCNT3;
   // A period that has just ended may still wait for its interrupt.

@@ -2,25 +2,19 @@
 
 #include <util/twi.h>
 
-#include "ticker.h"
-
 namespace twi {
 namespace {
-
-constexpr uint32_t TIMEOUT = 8000;  // 4 ms in half microseconds; 16 bytes take 0.5 ms
 
 volatile Status state;
 uint8_t address, reg, value, count;
 bool reading;
 volatile uint8_t at;
 uint8_t buffer[MOST];
-uint32_t started;
 
 constexpr uint8_t GO = _BV(TWINT) | _BV(TWEN) | _BV(TWIE);
 
 void start() {
   at = 0;
-  started = ticker::now();
   state = BUSY;
   TWCR = GO | _BV(TWSTA);
 }
@@ -28,19 +22,6 @@ void start() {
 void end(Status how) {
   TWCR = _BV(TWINT) | _BV(TWEN) | _BV(TWSTO);
   state = how;
-}
-
-// A part that was cut off in the midst of a byte may hold the data line: clock it out.
-void free_bus() {
-  TWCR = 0;
-  digitalWrite(SCL, LOW);
-  for (uint8_t i = 0; i < 9; i++) {
-    pinMode(SCL, OUTPUT);
-    delayMicroseconds(5);
-    pinMode(SCL, INPUT_PULLUP);
-    delayMicroseconds(5);
-  }
-  begin();
 }
 
 }  // namespace
@@ -69,12 +50,20 @@ void read(uint8_t from, uint8_t from_reg, uint8_t bytes) {
   start();
 }
 
-Status status() {
-  if (state == BUSY && ticker::now() - started > TIMEOUT) {
-    free_bus();
-    state = FAILED;
+Status status() { return state; }
+
+void give_up() {
+  // A part that was cut off in the midst of a byte may hold the data line: clock it out.
+  TWCR = 0;
+  digitalWrite(SCL, LOW);
+  for (uint8_t i = 0; i < 9; i++) {
+    pinMode(SCL, OUTPUT);
+    delayMicroseconds(5);
+    pinMode(SCL, INPUT_PULLUP);
+    delayMicroseconds(5);
   }
-  return state;
+  begin();
+  state = FAILED;
 }
 
 const uint8_t *data() { return buffer; }

@@ -12,8 +12,9 @@ void begin();
 void write(uint8_t address, uint8_t reg, uint8_t value);
 void read(uint8_t address, uint8_t reg, uint8_t count);
 
-// How the last transfer stands. One that takes too long is given up, and the bus freed.
-Status status();
+Status status();  // of the last transfer
+// Let a transfer be that takes too long, and free the bus.
+void give_up();
 const uint8_t *data();
 
 constexpr uint8_t MOST = 16;  // bytes of a transfer

@@ -161,6 +161,15 @@ static int16_t duty(const motor_t *motor) {
 	return ahead == back ? 0 : motor->sign * (ahead ? 1 : -1) * pwm(motor->pwm);
 }
 
+/*
+ * Only the registers of the PWM timers are looked at. Were they to run, their 80,000 events a second, which nobody
+ * waits for, would take half of the time: they are plain memory.
+ */
+static void freeze_pwm_timers(void) {
+	for (int timer = 0xA0; timer <= 0x120; timer += 0x80)
+		for (int address = timer; address <= timer + 13; address++) avr->io[AVR_DATA_TO_IO(address)].w.c = NULL;
+}
+
 /* ---- serial line ---- */
 
 static void on_sent(struct avr_irq_t *irq, uint32_t value, void *param) {
@@ -293,6 +302,7 @@ static void begin(const char *path) {
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent, NULL);
 	avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING, on_interrupt, NULL);
 	inertial_begin(&inertial, avr);
+	freeze_pwm_timers();
 	for (int side = 0; side < 2; side++) {
 		encoder_t *encoder = &encoders[side];
 		encoder->irq[0] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port_of(encoder->a)), bit_of(encoder->a));
