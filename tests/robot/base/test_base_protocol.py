@@ -157,12 +157,13 @@ def test_frames_that_never_came_are_counted_and_a_reset_of_the_base_is_no_loss()
     assert decoder.lost == 5
 
 
-def test_the_end_of_a_frame_is_its_place_in_the_stream() -> None:
+def test_a_frame_tells_its_place_in_the_stream() -> None:
     first, second = encode(a_state(0), 0), encode(Ack(1, 0), 1)
     decoder = Decoder()
     stream = b"\x07\x08\0" + first + b"\0\0" + second
-    ends = [r.end for at in range(0, len(stream), 5) for r in decoder.feed(stream[at : at + 5])]
-    assert ends == [3 + len(first), len(stream)]
+    found = [r for at in range(0, len(stream), 5) for r in decoder.feed(stream[at : at + 5])]
+    assert [r.end for r in found] == [3 + len(first), len(stream)]
+    assert [stream[r.begin : r.end] for r in found] == [first, second]
 
 
 @pytest.mark.parametrize(

@@ -36,12 +36,13 @@ class Received:
     ----------
     message : Message
     sequence : int
-    end : int
-        Place of the byte behind the frame, counted from the stream's beginning.
+    begin, end : int
+        Place of the frame's first byte and of the one behind its last, counted from the stream's beginning.
     """
 
     message: Message
     sequence: int
+    begin: int
     end: int
 
 
@@ -179,7 +180,7 @@ class Decoder:
                 continue
             self.good += 1
             self._follow(message, sequence)
-            found.append(Received(message, sequence, end))
+            found.append(Received(message, sequence, end - len(coded) - 1, end))
         if len(self._rest) > _LONGEST_FRAME:  # no frame any more; what comes up to the next zero belongs to it
             self.refused["long"] += not self._flooded
             self._rest, self._flooded = b"", True
