@@ -22,7 +22,7 @@ from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
-from contourslam.slam.mapper import Mapper
+from contourslam.slam.mapper import Finished, Mapper
 
 __all__ = ["Drawn", "Processed", "Session"]
 
@@ -308,6 +308,11 @@ class Session:
             mapper = self._backing.open(saved)
             self._leisure.set_aside(self._kept, self._version)
             self._swap(mapper)
+
+    def finish(self) -> Finished | None:
+        """Revise the whole drive as at the end of a recording, where the back end can; no scan may come after that."""
+        with self._work:
+            return self._course.mapper.finish()
 
     def close(self) -> None:
         """Save what has not been saved by itself yet, where there is a place for it, and end."""

@@ -1,0 +1,154 @@
+"""The map made while the robot drives: a live session in its thread, and what it leaves behind as a run."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.config import Config, LiveConfig
+from contourslam.geometry.poses import between, compose
+from contourslam.live.processed import Processed
+from contourslam.live.session import Session
+from contourslam.live.start import mapping
+from contourslam.live.worker import Worker
+from contourslam.scan import LaserScan, Odometry
+from contourslam.slam.result import OdometryReadings, RunResult
+
+Floats = NDArray[np.float64]
+
+
+class LiveMap:
+    """Scans and odometry in, the robot's pose out at any time; a run when all is over.
+
+    Parameters
+    ----------
+    config : Config
+    live : LiveConfig
+    lidar_mount : tuple of (float, float, float)
+        ``T_base_lidar``: m, m, rad.
+    initial_pose : ndarray, shape (3,), optional
+        Of the base at its first scan; the origin by default.
+    autosave : Path, optional
+        Where the map is saved by itself.
+    clock : callable
+        One that nobody sets, s.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        live: LiveConfig,
+        *,
+        lidar_mount: tuple[float, float, float],
+        initial_pose: Floats | None = None,
+        autosave: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._config = config
+        self.session: Session = mapping(
+            config, live, autosave=autosave, initial_pose=initial_pose, lidar_mount=np.array(lidar_mount), clock=clock
+        )
+        self._start = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, dtype=np.float64)
+        self._error: BaseException | None = None
+        self._worker = Worker(self.session, self._take, clock=clock, failed=self._fail)
+        self._lock = threading.Lock()
+        self._done: list[tuple[Processed, int]] = []
+        self._readings: list[Odometry] = []
+        self._worker.start()
+
+    def push(self, message: LaserScan | Odometry) -> None:
+        """Take in a scan or an odometry reading; returns at once.
+
+        Raises
+        ------
+        Exception
+            With which the mapping ended, where it did: no known failure.
+        """
+        if self._error is not None:
+            raise self._error
+        if isinstance(message, Odometry):
+            self._readings.append(message)
+            self._worker.push_odometry(message)
+        else:
+            self._worker.push_scan(message)
+
+    def _take(self, processed: Processed) -> None:
+        with self._lock:
+            self._done.append((processed, len(self._readings)))
+
+    def _fail(self, error: BaseException) -> None:
+        self._error = error
+
+    @property
+    def last(self) -> Processed | None:
+        """What the last scan gave; None before the first."""
+        with self._lock:
+            return self._done[-1][0] if self._done else None
+
+    def pose(self) -> tuple[float, float, float] | None:
+        """Pose of the base at the newest odometry reading: x (m), y (m), heading (rad); None before the first scan."""
+        if not self._readings:
+            return None
+        newest = self._readings[-1]
+        T_map_odom = self.session.map_to_odom(newest.stamp)
+        if T_map_odom is None:
+            return None
+        x, y, heading = compose(T_map_odom, newest.pose).tolist()
+        return x, y, heading
+
+    def close(self) -> None:
+        """Let the last scan be mapped, and end the thread."""
+        self._worker.stop()
+
+    def result(self, skipped: dict[str, int] | None = None, *, complete: bool = True) -> RunResult:
+        """Give the run, revised at its end where the back end can; after :meth:`close`.
+
+        Parameters
+        ----------
+        skipped : dict, optional
+            What could not be used, by reason.
+        complete : bool
+        """
+        done = self._done
+        updates = [processed.update for processed, _ in done]
+        stamps = np.array([u.stamp for u in updates])
+        online = np.array([u.pose for u in updates]).reshape(-1, 3)
+        covariances = np.array([u.covariance for u in updates]).reshape(-1, 3, 3)
+        raw = np.array([processed.T_odom_base for processed, _ in done]).reshape(-1, 3)
+        readings = None
+        if len(raw):
+            origin = raw[0]
+            raw = compose(self._start, between(origin, raw))
+            rows = np.array([[r.stamp, *r.pose] for r in self._readings]).reshape(-1, 4)
+            before = np.searchsorted([count for _, count in done], np.arange(len(rows)), side="right")
+            readings = OdometryReadings(rows[:, 0], compose(self._start, between(origin, rows[:, 1:])), before)
+        finished = self.session.finish()
+        whole = finished is not None and len(finished.poses) == len(online)  # not where another map was begun
+        quality = [u.quality for u in updates if u.quality is not None]
+        counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64)
+        counts = counts.reshape(-1, 4)
+        return RunResult(
+            detector=self._config.detector,
+            stamps=stamps,
+            poses=finished.poses if finished is not None and whole else online,
+            covariances=finished.covariances if finished is not None and whole else covariances,
+            odometry=raw,
+            truth=None,
+            nis=np.array([u.nis for u in updates]),
+            nis_dof=counts[:, 3],
+            matched_count=counts[:, 0],
+            corner_count=counts[:, 1],
+            wall_count=counts[:, 2],
+            corner_map=self.session.corner_map(),
+            wall_map=self.session.wall_map(),
+            skipped=dict(skipped or {}),
+            complete=complete,
+            back_end=self._config.back_end,
+            online_poses=online if whole else None,
+            quality=np.array(quality) if quality else None,
+            loops=finished.loops if finished is not None else (),
+            readings=readings,
+        )
