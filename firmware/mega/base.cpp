@@ -98,7 +98,8 @@ void control(const ticker::Sample &sample) {
   if (mode == Mode::DRIVING && (int32_t)(sample.now - driven_at) >= (int32_t)WATCHDOG) stop(Mode::EXPIRED);
   if (mode != Mode::DRIVING) return;
   for (uint8_t side = 0; side < 2; side++) {
-    duties[side] = controllers[side].step(wanted[side], speedometers[side].speed(), gains);
+    const Speedometer &wheel = speedometers[side];
+    duties[side] = controllers[side].step(wanted[side], wheel.speed(), wheel.moved(), gains);
     motors::set((Side)side, duties[side]);
   }
 }

@@ -37,9 +37,17 @@
 // Speed control: per mille of full duty per tick/s, per tick, per tick/s^2, per tick/s (see README.md, Tuning).
 #ifndef GAIN_KP
 #define GAIN_KP 0.15f
-#define GAIN_KI 1.5f
+#define GAIN_KI 2.5f
 #define GAIN_KD 0.0f
 #define GAIN_FEED_FORWARD 0.125f
+#endif
+
+// How fast the wheels follow, and shall: time until a step is 63 % done, s. Duty that only just does not turn a wheel.
+#ifndef MOTOR_TIME_CONSTANT
+#define MOTOR_TIME_CONSTANT 0.08f
+#endif
+#ifndef MOTOR_DEAD_BAND
+#define MOTOR_DEAD_BAND 0.0f
 #endif
 
 // IMU on pins 20 (SDA) and 21 (SCL), address 0x68 (AD0 low). Which of its axes points ahead, to the left and up in

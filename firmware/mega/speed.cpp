@@ -1,5 +1,6 @@
 #include "speed.h"
 
+#include "config.h"
 #include "ticker.h"
 
 namespace {
@@ -9,6 +10,7 @@ constexpr int32_t CYCLE = 4;                // ... or a whole cycle of the encod
 constexpr uint32_t STANDSTILL = 400000;     // 200 ms without an edge: less than 5 ticks/s
 constexpr float FULL = 1000;                // per mille
 constexpr float DT = ticker::PERIOD_US * 1e-6f;
+constexpr float FOLLOWS = DT / (DT + MOTOR_TIME_CONSTANT);
 }  // namespace
 
 void Speedometer::update(int32_t count, uint32_t edge, uint32_t now) {
@@ -27,23 +29,35 @@ void Speedometer::update(int32_t count, uint32_t edge, uint32_t now) {
     float most = (abs(ticks) + 1) * PER_SECOND / waited;
     speed_ = constrain(speed_, -most, most);
   }
+  // Since its newest edge the wheel has gone on, but not as far as the next.
+  float part = constrain(speed_ / PER_SECOND * (int32_t)(now - edge), -1.0f, 1.0f);
+  moved_ = (count - newest_) + (part - part_);
+  newest_ = count;
+  part_ = part;
 }
 
-float Controller::step(float wanted, float measured, const Gains &gains) {
+float Controller::step(float wanted, float measured, float moved, const Gains &gains) {
+  if (!running_) {
+    model_ = before_ = measured;
+    behind_ = 0;
+    running_ = true;
+  }
+  model_ += (wanted - model_) * FOLLOWS;
+  if (fabs(wanted - model_) < 1) model_ = wanted;
   float slope = (measured - before_) / DT;
   before_ = measured;
-  if (wanted == 0 && measured == 0) {
-    integral_ = 0;
+  if (wanted == 0 && model_ == 0 && measured == 0) {
+    behind_ = 0;
     return 0;  // no hum at rest
   }
-  float error = wanted - measured;
-  float direct = gains.feed_forward * wanted + gains.kp * error - gains.kd * slope;
-  float integral = integral_ + gains.ki * error * DT;
-  float duty = direct + integral;
-  // At the end of its range the integral only ever moves back in.
-  if ((duty > FULL && error > 0) || (duty < -FULL && error < 0)) duty = direct + integral_;
-  else integral_ = constrain(integral, -FULL, FULL);
+  // The integral of the speed's error is counted, not measured: the mean speed is exact.
+  float behind = behind_ + model_ * DT - moved;
+  float direct = gains.feed_forward * wanted + gains.kp * (model_ - measured) - gains.kd * slope;
+  if (wanted > 0) direct += MOTOR_DEAD_BAND;
+  if (wanted < 0) direct -= MOTOR_DEAD_BAND;
+  float duty = direct + gains.ki * behind;
+  bool grows = fabs(behind) > fabs(behind_);
+  if (fabs(duty) > FULL && grows && (duty > 0) == (behind > 0)) duty = direct + gains.ki * behind_;
+  else behind_ = behind;
   return constrain(duty, -FULL, FULL);
 }
-
-void Controller::reset() { integral_ = before_ = 0; }
