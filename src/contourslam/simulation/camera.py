@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contourslam.errors import ConfigError, MissingExtraError, ResultError
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.geometry.rigid import from_planar
 from contourslam.kernels import kernel
 from contourslam.recordings.picture import Picture
 from contourslam.simulation.chance import CAMERA
@@ -51,6 +52,9 @@ class FisheyeCamera:
     ----------
     camera : CameraModel
     T_base_camera : ndarray, shape (4, 4)
+    robot : RobotModel
+    taken : int
+        How many pictures were taken.
     textures : RoomTextures
         What is painted on the room: the truth about the pictures.
 
@@ -72,12 +76,13 @@ class FisheyeCamera:
         self._mujoco = import_mujoco()
         self.camera = camera or CameraModel()
         self.textures = room if isinstance(room, RoomTextures) else room_textures(room, seed)
-        self._robot, self._seed = robot or RobotModel(), seed
+        self.robot, self._seed = robot or RobotModel(), seed
         self.T_base_camera = self.camera.mount if T_base_camera is None else _as_matrix(T_base_camera)
         self._faces, self._columns, self._rows, self._factors = _plan(self.camera)
-        self._model = compile_textured_world(self.textures, self._robot, self.T_base_camera)
+        self._model = compile_textured_world(self.textures, self.robot, self.T_base_camera)
         self._data = self._mujoco.MjData(self._model)
         self._graphics: _Graphics | None = None
+        self.taken = 0
 
     @property
     def model(self) -> FisheyeModel:
@@ -113,6 +118,7 @@ class FisheyeCamera:
             If there are no graphics on this machine, or another thread has the camera.
         """
         T_world_base = _as_matrix(pose)
+        self.taken += 1
         self._place(T_world_base)
         sheet = self._drawn(T_world_base @ self.T_base_camera)
         height, width = self._columns.shape
@@ -140,6 +146,11 @@ class FisheyeCamera:
         Image.fromarray(self.render(pose, stamp)).save(data, "JPEG", quality=self.camera.jpeg_quality)
         return Picture(stamp, data.getvalue(), "jpeg")
 
+    def open(self) -> None:
+        """Open the graphics, which the first picture would do otherwise; errors as :meth:`picture`."""
+        self.picture(self.textures.room.start, 0.0)
+        self.taken = 0
+
     def close(self) -> None:
         """Give the graphics back; the next picture would open them anew."""
         if self._graphics is not None:
@@ -158,7 +169,7 @@ class FisheyeCamera:
         """Put the robot there, so that its own body is where the camera sees it."""
         quaternion = np.empty(4)
         self._mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(T_world_base[:3, :3]).ravel())
-        self._data.qpos[:3] = T_world_base[:3, 3] + self._robot.wheel_radius * T_world_base[:3, 2]
+        self._data.qpos[:3] = T_world_base[:3, 3] + self.robot.wheel_radius * T_world_base[:3, 2]
         self._data.qpos[3:7] = quaternion
         self._mujoco.mj_kinematics(self._model, self._data)
         self._mujoco.mj_camlight(self._model, self._data)
@@ -265,6 +276,4 @@ def _as_matrix(pose: ArrayLike) -> Floats:
         raise ConfigError(f"a camera's base pose must be finite, shape (3,) or (4, 4), got {pose!r}")
     if pose.shape == (4, 4):
         return pose
-    x, y, heading = pose.tolist()
-    cos, sin = math.cos(heading), math.sin(heading)
-    return np.array([[cos, -sin, 0.0, x], [sin, cos, 0.0, y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    return from_planar(pose)

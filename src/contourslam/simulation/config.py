@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.geometry.rigid import rigid
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,10 +144,7 @@ class CameraModel:
         tilt = math.radians(self.tilt_deg)
         cos, sin = math.cos(tilt), math.sin(tilt)
         right, down, ahead = (0.0, -1.0, 0.0), (sin, 0.0, -cos), (cos, 0.0, sin)
-        found = np.eye(4)
-        found[:3, :3] = np.array([right, down, ahead]).T
-        found[:3, 3] = self.x, self.y, self.height
-        return found
+        return rigid(np.array([right, down, ahead]).T, (self.x, self.y, self.height))
 
     @property
     def face_pixels(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.geometry.rigid import from_planar
 from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.simulation.config import LidarModel, SimulationConfig
 from contourslam.simulation.drive import Drive, Progress, drive
@@ -49,6 +50,11 @@ class SimulatedRun:
     def lidar_mount(self) -> Floats:
         """Pose of the lidar in the base frame: x (m), y (m), heading (rad), shape (3,)."""
         return np.array([self.lidar.mount_x, 0.0, 0.0])
+
+    @property
+    def lidar_place(self) -> Floats:
+        """T_base_lidar: the same in space, from the floor below the axle, shape (4, 4), m."""
+        return from_planar(self.lidar_mount, self.lidar.mount_height)
 
     @property
     def initial_pose(self) -> Floats:
