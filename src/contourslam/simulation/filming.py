@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.rigid import rigid
