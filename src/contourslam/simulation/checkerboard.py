@@ -48,6 +48,12 @@ class PolynomialLens:
         angles = np.linspace(0.0, math.radians(0.5 * self.field_of_view_deg + 4.0), 40_000)
         return angles, self.f * angles * (1.0 + angles**2 * (self.a + self.b * angles**2))
 
+    @cached_property
+    def all_rays(self) -> tuple[Floats, Bools]:
+        """Rays of all pixels, row by row, and which are within the field of view."""
+        rows, columns = np.mgrid[: self.height, : self.width]
+        return self.unproject(np.column_stack([columns.ravel(), rows.ravel()]))
+
     def project(self, rays: ArrayLike) -> tuple[Floats, Bools]:
         """Tell where rays, shape (n, 3), fall, shape (n, 2), and which are within the field of view."""
         rays = np.asarray(rays, dtype=np.float64)
@@ -105,8 +111,7 @@ def render_board(
     ndarray of uint8, shape (height, width)
     """
     rng = np.random.default_rng(seed)
-    rows, columns = np.mgrid[: lens.height, : lens.width]
-    rays, seen = lens.unproject(np.column_stack([columns.ravel(), rows.ravel()]))
+    rays, seen = lens.all_rays
     waves, phases = rng.normal(0.0, 4.0, (6, 3)), rng.uniform(0.0, 2.0 * math.pi, 6)
     patchy = 110.0 + 12.0 * np.cos(rays @ waves.T + phases).sum(axis=1)
     picture = np.where(seen, patchy, _DARK).reshape(lens.height, lens.width)

@@ -27,9 +27,11 @@ def png(pixels: np.ndarray) -> Picture:
 
 @pytest.fixture(scope="module")
 def done() -> PicturesCalibrated:
-    """16 pictures of a board, one without it, one damaged, one that shows what another did."""
-    places = boards_around(CORNERS, BOARD.square, 16, seed=3)
-    pictures = [(f"{i:02}", png(render_board(LENS, CORNERS, BOARD.square, T, seed=i))) for i, T in enumerate(places)]
+    """14 pictures of a board, one without it, one damaged, one that shows what another did."""
+    places = boards_around(CORNERS, BOARD.square, 14, seed=3)
+    pictures = [
+        (f"{i:02}", png(render_board(LENS, CORNERS, BOARD.square, T, seed=i, samples=2))) for i, T in enumerate(places)
+    ]
     pictures.append(("twin", png(render_board(LENS, CORNERS, BOARD.square, places[4], seed=99))))
     away = places[0] @ np.diag([1.0, 1.0, 1.0, 1.0])
     away[:3, 3] = 0.0, 0.0, -5.0
@@ -46,13 +48,14 @@ def ray_errors_deg(lens: PolynomialLens, model: FisheyeModel) -> np.ndarray:
     true, lit = lens.unproject(pixels)
     found, _ = model.unproject(pixels)
     across = np.linalg.norm(np.cross(true[lit], found[lit]), axis=1)
-    return np.degrees(np.arctan2(across, (true[lit] * found[lit]).sum(axis=1)))
+    angles: np.ndarray = np.degrees(np.arctan2(across, (true[lit] * found[lit]).sum(axis=1)))
+    return angles
 
 
 def test_reprojection_is_below_half_a_pixel_out_to_100_degrees(done: PicturesCalibrated) -> None:
     found = done.calibration
     used = [view for view in found.views if view.used]
-    assert len(used) >= 15
+    assert len(used) >= 13
     assert found.rms < 0.15 and max(view.rms for view in used) < 0.5
     assert max(view.angles_deg[1] for view in used) > 100.0
     assert sum(found.ring_corners) == len(used) * 54 and found.ring_corners[10] > 0
@@ -63,7 +66,7 @@ def test_every_ray_is_within_half_a_degree_of_the_true_one(done: PicturesCalibra
 
 
 def test_boards_are_placed_where_they_were(done: PicturesCalibrated) -> None:
-    places = boards_around(CORNERS, BOARD.square, 16, seed=3)
+    places = boards_around(CORNERS, BOARD.square, 14, seed=3)
     for view in done.calibration.views:
         true = places[int(view.name)]
         found, wanted = ((T @ np.append(BOARD.middle, 1.0))[:3] for T in (view.T_camera_board, true))
@@ -87,7 +90,7 @@ def exact_views(lens: PolynomialLens, count: int, noise: float, seed: int = 0, *
 
 
 @pytest.mark.parametrize("lens", [LENS, STEREOGRAPHIC], ids=["equal-area", "stereographic"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_start_is_good_enough_for_any_lens(lens: PolynomialLens, seed: int) -> None:
     found = calibrate(lens.width, lens.height, BOARD, exact_views(lens, 12, 0.1, seed))
     assert found.rms < 0.25
@@ -95,11 +98,12 @@ def test_the_start_is_good_enough_for_any_lens(lens: PolynomialLens, seed: int) 
 
 
 def test_the_uncertainty_told_is_that_of_repeated_calibrations() -> None:
-    """Within the rings that have corners; the spread over 12 noises of one ray at 60 degrees."""
+    """The spread over 6 noises of one ray at 60 degrees."""
     rays, told = [], []
-    for seed in range(12):
+    exact = exact_views(LENS, 10, 0.0)
+    for seed in range(6):
         rng = np.random.default_rng(seed)
-        views = [View(v.name, v.corners + rng.normal(0.0, 0.5, v.corners.shape)) for v in exact_views(LENS, 10, 0.0)]
+        views = [View(v.name, v.corners + rng.normal(0.0, 0.5, v.corners.shape)) for v in exact]
         found = calibrate(LENS.width, LENS.height, BOARD, views)
         x, y = LENS.project(np.array([[np.sin(np.pi / 3.0), 0.0, 0.5]]))[0][0]
         rays.append(found.model.unproject([[x, y]])[0][0])

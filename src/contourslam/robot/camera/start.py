@@ -21,6 +21,7 @@ _CURVES: tuple[Callable[[Floats], Floats], ...] = (
     lambda angle: 2.0 * np.sin(0.5 * angle),
     lambda angle: 2.0 * np.tan(0.5 * angle),
 )
+_SCALES, _SOME = 14, 8  # of a lens that are tried, and views that they are tried on
 _XI = 1.6  # with it and two terms of distortion the unified model follows all of them
 
 
@@ -77,7 +78,7 @@ def place_board(rays: Floats, board: Floats) -> tuple[Floats, Floats, float]:
     x, y, z = (component[:, None] * plane for component in rays.T)
     zero = np.zeros_like(x)
     rows = np.vstack([np.hstack([zero, -z, y]), np.hstack([z, zero, -x]), np.hstack([-y, x, zero])])
-    homography = np.linalg.svd(rows, full_matrices=False)[2][-1].reshape(3, 3)
+    homography = np.linalg.eigh(rows.T @ rows)[1][:, 0].reshape(3, 3)
     seen = plane @ homography.T
     if np.median((seen * rays).sum(axis=1)) < 0.0:
         homography, seen = -homography, -seen
@@ -102,8 +103,7 @@ def place_boards(model: FisheyeModel, board: Floats, seen: Floats) -> tuple[Bund
         See :func:`place_board`; infinite where a corner is on no ray of the lens.
     """
     turns, places, misfits = [], [], []
-    for pixels in seen:
-        rays, _ = model.unproject(pixels)
+    for rays in model.unproject(seen)[0].reshape(*seen.shape[:2], 3):
         known = np.isfinite(rays).all()
         turn, place, misfit = place_board(rays, board) if known else (np.eye(3), np.array([0.0, 0.0, 1.0]), math.inf)
         turns.append(turn)
@@ -144,14 +144,15 @@ def first_guess(
         The views whose corners all lie on rays of the lens.
     """
     best: tuple[float, FisheyeModel | None] = math.inf, None
+    some = seen[:: max(len(seen) // _SOME, 1)]
     rim = 0.5 * max(width, height) / math.radians(0.5 * field_of_view_deg)
     for curve in range(len(_CURVES)):
-        for f in rim * np.geomspace(0.45, 2.2, 27):
+        for f in rim * np.geomspace(0.45, 2.2, _SCALES):
             try:
                 model = rough_lens(width, height, float(f), field_of_view_deg, curve)
             except ConfigError:  # equal area turns back at half a turn
                 continue
-            misfits = place_boards(model, board, seen)[1]
+            misfits = place_boards(model, board, some)[1]
             # A lens on which some views have no rays at all must not win by the few others.
             score = float(np.sqrt(np.mean(np.minimum(misfits, 0.3) ** 2)))
             if score < best[0]:
