@@ -95,6 +95,21 @@ class FisheyeCamera:
         swing = 0.6 * math.sin(stamp / 2.9 + phases[0]) + 0.4 * math.sin(stamp / 1.1 + phases[1])
         return math.exp(self.camera.exposure_wander * swing)
 
+    def own_body(self) -> NDArray[np.bool_]:
+        """Tell which pixels show the robot itself, wherever it is, or nothing at all; shape (height, width)."""
+        self._place(np.eye(4))
+        height, width = self.model.height, self.model.width
+        columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+        rays, seen = self.model.unproject(np.stack([columns.ravel(), rows.ravel()], axis=1))
+        ahead = np.ascontiguousarray(np.where(seen[:, None], rays, [0.0, 0.0, 1.0]) @ self.T_base_camera[:3, :3].T)
+        geoms, ranges = np.empty(len(rays), dtype=np.int32), np.empty(len(rays))
+        lens, far = np.ascontiguousarray(self.T_base_camera[:3, 3]), 10.0
+        # All but the robot is fixed to the world, and left out.
+        self._mujoco.mj_multiRay(
+            self._model, self._data, lens, ahead.ravel(), None, False, -1, geoms, ranges, None, len(rays), far
+        )
+        return np.asarray(~seen | (geoms >= 0)).reshape(height, width)
+
     def render(self, pose: ArrayLike, stamp: float = 0.0) -> Bytes:
         """Take a picture.
 

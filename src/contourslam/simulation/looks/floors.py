@@ -13,6 +13,7 @@ from contourslam.simulation.room import Room
 from contourslam.simulation.textures import Surface
 
 Floats = NDArray[np.float64]
+_CEILING_PIXEL = 0.02  # m; nothing on a ceiling is fine
 _SHADE = 0.10  # m; how far from what stands on it the floor is darker
 _RUGS = (
     ((0.55, 0.16, 0.15), (0.93, 0.85, 0.68), (0.14, 0.20, 0.36)),
@@ -46,13 +47,30 @@ def draw_floor(room: Room, kind: Kind, pixel: float, chance: np.random.Generator
     return Surface("floor", corner, right, down, *size, canvas.image(), pixel)
 
 
-def draw_ceiling(room: Room, pixel: float, chance: np.random.Generator) -> Surface:
-    """White plaster; one tile of it, repeated."""
+def draw_ceiling(room: Room, kind: Kind, chance: np.random.Generator) -> Surface:
+    """White plaster with a round lamp at home, panels of light in an office, tubes in a hall."""
     low, size = _extent(room)
-    tile = materials.plain(2.0, 2.0, pixel, (0.96, 0.96, 0.95), chance)
+    canvas = Canvas(*size, _CEILING_PIXEL, (0.93, 0.93, 0.92))
+    canvas.grain(0.02, (1.0, 1.0), chance)
+    if kind == "home":
+        x, z = 0.48 * size[0], 0.52 * size[1]
+        glow = np.exp(-np.hypot(canvas.x - x, canvas.z - z) / 0.6)[..., None].astype(np.float32)
+        canvas.pixels += 0.07 * glow
+        canvas.disc(x, z, 0.27, (0.62, 0.55, 0.42))
+        canvas.disc(x, z, 0.25, (1.0, 0.98, 0.90))
+    else:
+        panel, each = ((0.6, 0.6), (2.4, 2.4)) if kind == "office" else ((1.8, 0.15), (3.6, 3.0))
+        for x in np.arange(each[0] / 2, size[0], each[0]).tolist():
+            for z in np.arange(each[1] / 2, size[1], each[1]).tolist():
+                edges = x - panel[0] / 2, x + panel[0] / 2, z - panel[1] / 2, z + panel[1] / 2
+                canvas.fill(*edges, (1.0, 1.0, 1.0))
+                canvas.shade(edges[0], edges[1], edges[2], edges[2] + 0.03, 0.7)
+                canvas.shade(edges[0], edges[1], edges[3] - 0.03, edges[3], 0.7)
+        step = 0.6 if kind == "office" else 2.5  # joints between its panels
+        canvas.pixels[(canvas.x % step < 0.02) | (canvas.z % step < 0.02)] *= np.float32(0.85)
     corner = np.array([low[0], low[1], room.wall_height])
     right, down = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-    return Surface("ceiling", corner, right, down, *size, tile.image(), pixel)
+    return Surface("ceiling", corner, right, down, *size, canvas.image(), _CEILING_PIXEL)
 
 
 def _extent(room: Room) -> tuple[Floats, tuple[float, float]]:

@@ -78,7 +78,8 @@ class Shelf:
         if box.colour == CARTON:
             return materials.cardboard
         if box.colour in (GREY, STEEL) or (self._kind == "hall" and box.colour == GREEN):
-            return materials.metal if bulky or height > 0.5 else None
+            column = height > 3.0
+            return materials.metal if (bulky or height > 0.5) and not column else None
         if box.colour in _WOODS and bulky:
             return materials.cabinet if wide and self._kind != "hall" else None
         return materials.fabric if soft and self._kind != "hall" else None

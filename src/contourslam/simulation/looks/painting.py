@@ -26,7 +26,7 @@ def paint(room: Room, seed: int) -> tuple[Surface, ...]:
     pixel = _resolution(room)
     style = draw_style(_kind(room), _stream(seed, 2))
     shelf = Shelf(pixel, style.kind, seed)
-    surfaces = [draw_floor(room, style.kind, pixel, _stream(seed, 0)), draw_ceiling(room, pixel, _stream(seed, 1))]
+    surfaces = [draw_floor(room, style.kind, pixel, _stream(seed, 0)), draw_ceiling(room, style.kind, _stream(seed, 1))]
     count = len(room.outline)
     for index in range(count):
         start, end = (np.array(room.outline[k % count]) for k in (index, index + 1))
