@@ -107,9 +107,9 @@ def bursts(share: float) -> Damage:
         (substituted(0.2), 0),
         (removed(0.2), 0),
         (bursts(0.2), 20_000),
-        (substituted(0.05), 150),
+        (substituted(0.05), 15_000),
         (removed(0.05), 150),
-        (substituted(0.01), 20_000),
+        (substituted(0.01), 50_000),
     ],
 )
 def test_a_damaged_stream_yields_only_true_beams(damage: Damage, least: int) -> None:

@@ -19,10 +19,12 @@ _FULL_TURN = 360 * 64  # an angle's highest value once its check bit is shifted 
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """Packets whose checksum is right, in the order of the stream.
+    """Packets in the order of the stream.
 
     Attributes
     ----------
+    sound : ndarray of bool, shape (k,)
+        Its checksum is right.
     starts : ndarray of bool, shape (k,)
         A turn starts with this packet.
     first_deg, last_deg : ndarray, shape (k,)
@@ -35,6 +37,7 @@ class Packets:
         Place of the packet's first byte and of the one after its last, counted from the stream's beginning.
     """
 
+    sound: NDArray[np.bool_]
     starts: NDArray[np.bool_]
     first_deg: Floats
     last_deg: Floats
@@ -63,7 +66,8 @@ class PacketParser:
         Bytes among them that belong to no good packet.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, salvage: bool = False) -> None:
+        self._salvage = salvage
         self.good = self.bad = self.received = self.skipped = 0
         self._rest = b""
 
@@ -88,8 +92,8 @@ class PacketParser:
         buffer = self._rest + data if self._rest else data
         origin = self.received - len(self._rest)
         self.received += len(data)
-        found: list[tuple[int, NDArray[np.uint16]]] = []
-        at, useful = 0, 0
+        found: list[tuple[int, bool, NDArray[np.uint16]]] = []
+        at, useful, good = 0, 0, 0
         while True:
             begin = buffer.find(HEADER, at)
             if begin < 0:
@@ -106,16 +110,22 @@ class PacketParser:
             if len(buffer) - begin < size:
                 break
             words = np.frombuffer(buffer, "<u2", size // 2, begin)
+            end = begin + size
             if np.bitwise_xor.reduce(words):  # the checksum is the XOR of all other words
+                if self._salvage and len(buffer) < end + len(HEADER):
+                    break
                 self.bad += 1
-                at = begin + 2
+                # A header inside would be a sound packet's, behind a damaged length: the X4's samples never look so.
+                framed = self._salvage and buffer.find(HEADER, begin + 2, end + len(HEADER)) == end
+                if framed:
+                    found.append((origin + begin, False, words))
+                at = end if framed else begin + 2
                 continue
-            found.append((origin + begin, words))
-            useful += size
-            at = begin + size
+            found.append((origin + begin, True, words))
+            useful, good, at = useful + size, good + 1, end
         self._rest = bytes(buffer[at:])
         self.skipped += at - useful
-        self.good += len(found)
+        self.good += good
         return _decoded(found)
 
 
@@ -126,12 +136,13 @@ def _sound_head(buffer: bytes, at: int) -> bool:
     return sound and (count > 1 or first == last)
 
 
-def _decoded(found: Sequence[tuple[int, NDArray[np.uint16]]]) -> Packets:
-    heads = np.array([words[:5] for _, words in found], dtype=np.int64).reshape(-1, 5)
-    samples = [words[5:] for _, words in found]
-    begins = np.array([begin for begin, _ in found], dtype=np.int64)
+def _decoded(found: Sequence[tuple[int, bool, NDArray[np.uint16]]]) -> Packets:
+    heads = np.array([words[:5] for _, _, words in found], dtype=np.int64).reshape(-1, 5)
+    samples = [words[5:] for _, _, words in found]
+    begins = np.array([begin for begin, _, _ in found], dtype=np.int64)
     counts = heads[:, 1] >> 8
     return Packets(
+        np.array([sound for _, sound, _ in found], dtype=np.bool_),
         (heads[:, 1] & 1).astype(np.bool_),
         angle_deg(heads[:, 2]),
         angle_deg(heads[:, 3]),

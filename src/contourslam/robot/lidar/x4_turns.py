@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap
 from contourslam.robot.lidar.x4_clock import SampleClock
-from contourslam.robot.lidar.x4_packets import (
-    PacketParser,
-    Packets,
-    correction_deg,
-    distance_mm,
-    spans_deg,
-)
+from contourslam.robot.lidar.x4_packets import PacketParser, Packets, correction_deg, distance_mm
+from contourslam.robot.lidar.x4_salvage import Salvage
 from contourslam.scan import LaserScan
 
 Floats = NDArray[np.float64]
@@ -63,7 +58,8 @@ class TurnAssembler:
     """
 
     def __init__(self) -> None:
-        self.parser = PacketParser()
+        self.parser = PacketParser(salvage=True)
+        self._salvage = Salvage()
         self.turns = self.stalled = self.samples = 0
         self._clock = SampleClock()
         self._whole_mm = True  # as the X4 has it: until a clean line shows quarters
@@ -86,6 +82,7 @@ class TurnAssembler:
     def reset(self) -> None:
         """Drop what has begun, as after the port was opened anew; the counters go on."""
         self.parser.reset()
+        self._salvage.reset()
         self._clock.reset()
         self._forget()
 
@@ -119,7 +116,7 @@ class TurnAssembler:
         packets = self.parser.feed(data)
         # Bytes that belong to nothing are a packet whose header was hit, but for those before the first packet.
         failed = max(self.parser.bad - bad, int(self.parser.skipped > skipped and self._last_deg is not None))
-        seen = failed + len(packets)
+        seen = failed + int(packets.sound.sum())
         if seen:
             weight = 0.995**seen
             self._failures = weight * self._failures + (1.0 - weight) * (failed / seen)
@@ -128,29 +125,30 @@ class TurnAssembler:
     def _assemble(self, packets: Packets, read: float) -> list[LaserScan]:
         """Hand packet by packet to its turn; the samples are decoded together when the turn ends."""
         scans: list[LaserScan] = []
-        spans, ends, at = spans_deg(packets).tolist(), packets.ends.tolist(), 0
         noisy = self.noisy
         if not noisy and self._whole_mm:
-            self._whole_mm = not (packets.raw & 3).any()
-        heads = zip(
-            packets.starts.tolist(), packets.first_deg.tolist(), packets.counts.tolist(), packets.begins.tolist(),
-            strict=True,
-        )  # fmt: skip
-        for k, (starts, first, count, begin) in enumerate(heads):
-            raw, span, at = packets.raw[at : at + count], spans[k], at + count
-            if noisy and not self._fits(count, first, span, starts):
+            sound = np.repeat(packets.sound, packets.counts)
+            self._whole_mm = not (packets.raw[sound] & 3).any()
+        step = float(self._steps[-1]) if self._steps else None
+        for packet in self._salvage.passed(packets, step):
+            first, span, raw, count = packet.first, packet.span, packet.raw, packet.raw.size
+            # A damaged start mark would end the turn; a packet that starts one has a single sample.
+            starts = packet.starts and (packet.sound or count == 1)
+            if (noisy or not packet.sound) and not self._fits(count, first, span, starts):
                 continue
-            lost, broken = self._lost(first), begin != self._end
-            time, leapt = self._clock.first_sample(count, lost, broken, read, self.parser.received - ends[k])
-            self._end, self._last_deg = ends[k], first + span
+            lost, broken = self._lost(first), packet.begin != self._end
+            time, leapt = self._clock.first_sample(count, lost, broken, read, self.parser.received - packet.end)
+            self._end, self._last_deg = packet.end, first + span
             if count > 9:
                 self._steps.append(span / (count - 1))
             self._cut(starts, first, first + 0.5 * span, leapt, scans)
             # The packet's middle is what belongs to this turn; its first sample may lie a little before the start.
             base = (first - self._cut_at + 0.5 * span) % 360.0 - 0.5 * span
-            doubtful = noisy and self._whole_mm and bool((raw & 3).any())
-            if not doubtful:
-                self._pieces.append(_Piece(base, span, raw, time, self._clock.period, noisy))
+            wrong = (raw & 3 != 0) & (self._whole_mm and (noisy or not packet.sound))
+            if not packet.sound:
+                raw = np.where(wrong, 0, raw).astype(np.uint16)
+            if not packet.sound or not wrong.any():
+                self._pieces.append(_Piece(base, span, raw, time, self._clock.period, noisy or not packet.sound))
             self.samples += count
             if self.samples > MOST_BEAMS:
                 self.stalled += 1
@@ -207,7 +205,30 @@ def _in_company(mm: Floats, places: NDArray[np.int64]) -> NDArray[np.bool_]:
     joined &= (mm[1:] > 0.0) & (mm[:-1] > 0.0) & (places[1:] > 0)
     row = np.cumsum(np.concatenate([[0], ~joined]))
     middle = np.median(sliding_window_view(np.pad(mm, 2, mode="edge"), 5), axis=1)
-    return np.asarray((np.bincount(row)[row] >= 3) & (np.abs(mm - middle) < 15.0 + 0.01 * mm))
+    kept = np.flatnonzero((np.bincount(row)[row] >= 3) & (np.abs(mm - middle) < 15.0 + 0.01 * mm))
+    marks = np.zeros(mm.size, dtype=np.bool_)
+    marks[kept[_straight(mm[kept], kept, places[kept])]] = True
+    return marks
+
+
+def _straight(mm: Floats, at: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Mark the samples that lie on the line of the two nearest of their packet, on both sides or else on one."""
+    if mm.size < 3:
+        return np.zeros(mm.size, dtype=np.bool_)
+    steps = np.diff(at)
+    near = (steps < 4) & (np.diff(places) == steps)  # two seen in one packet, with no more than two lost between
+    slopes = np.diff(mm) / steps
+    inside = near[:-1] & near[1:]
+    out = np.full(mm.size, np.inf)
+    middle = mm[:-2] + (mm[2:] - mm[:-2]) / (at[2:] - at[:-2]) * steps[:-1]
+    out[1:-1] = np.where(inside, np.abs(mm[1:-1] - middle), np.inf)
+    # Where there is no neighbour on one side, the two on the other tell where it should lie.
+    after, before = np.full(mm.size, np.inf), np.full(mm.size, np.inf)
+    after[2:] = np.where(inside, np.abs(mm[2:] - mm[1:-1] - slopes[:-1] * steps[1:]), np.inf)
+    before[:-2] = np.where(inside, np.abs(mm[:-2] - mm[1:-1] + slopes[1:] * steps[:-1]), np.inf)
+    alone = ~np.isfinite(out)
+    out[alone] = np.minimum(after, before)[alone]
+    return np.asarray(out < 15.0 + 0.01 * mm)
 
 
 def _scan(pieces: list[_Piece], start_deg: float) -> LaserScan | None:
