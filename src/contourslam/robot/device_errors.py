@@ -45,3 +45,7 @@ class DeviceUnpluggedError(DeviceError):
 
 class DeviceFaultError(DeviceError):
     """The part itself reports a fault."""
+
+
+class DeviceVersionError(DeviceError):
+    """The part's firmware speaks another version of the protocol."""
