@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from contourslam.simulation.chance import LOOKS
 from contourslam.simulation.looks.floors import draw_ceiling, draw_floor
 from contourslam.simulation.looks.furniture import Shelf
-from contourslam.simulation.looks.walls import Kind, Style, draw_style, draw_wall
+from contourslam.simulation.looks.walls import Kind, draw_style, draw_wall
 from contourslam.simulation.pieces import WHITE, Box, Cylinder, Piece
 from contourslam.simulation.room import Room
 from contourslam.simulation.textures import Surface
@@ -17,40 +17,35 @@ Floats = NDArray[np.float64]
 _FINEST, _COARSEST, _PIXELS = 0.005, 0.02, 9e6  # m per pixel, and pixels in all
 _DEEP = 0.7  # m before a wall in which furniture hides what would hang there
 _FACETS = 32
-_HALL_HEIGHT = 3.5  # m
+_HALL_HEIGHT, _NARROW = 3.5, 0.3  # m
 _THIN = 0.15  # m; inner walls are, chimney breasts are not
 
 
 def paint(room: Room, seed: int) -> tuple[Surface, ...]:
     """Paint floor, ceiling, walls and pieces; see :func:`~contourslam.simulation.textures.room_textures`."""
     pixel = _resolution(room)
-    style = draw_style(_kind(room), _stream(seed, 2))
-    shelf = Shelf(pixel, style.kind, seed)
-    surfaces = [draw_floor(room, style.kind, pixel, _stream(seed, 0)), draw_ceiling(room, style.kind, _stream(seed, 1))]
-    count = len(room.outline)
-    for index in range(count):
-        start, end = (np.array(room.outline[k % count]) for k in (index, index + 1))
-        # Free space is on the left of the outline: from there, the side's end is its left edge.
-        surfaces.append(_wall(f"wall{index}", end, start, 0.0, room.wall_height, room, None, style, pixel, seed, index))
+    walls = _Walls(room, pixel, seed)
+    kind = walls.style.kind
+    shelf = Shelf(pixel, kind, seed)
+    surfaces = [draw_floor(room, kind, pixel, _stream(seed, 0)), draw_ceiling(room, kind, _stream(seed, 1))]
+    # Free space is on the left of the outline: from there, a side's end is its left edge.
+    ends = np.roll(np.array(room.outline), -1, axis=0)
+    for index, (start, end) in enumerate(zip(np.array(room.outline), ends, strict=True)):
+        surfaces.append(walls.wall(f"wall{index}", end, start, (0.0, room.wall_height), index, None))
     for index, piece in enumerate(room.pieces):
         name = f"piece{index}"
         if isinstance(piece, Cylinder):
             surfaces += _mantle(name, piece, shelf)
-        elif _is_wall(piece):
-            ends = piece.footprint()
-            for k in range(4):
-                a, b = ends[k], ends[(k + 1) % 4]
-                if math.dist(a, b) > 0.3:
-                    number = 1000 + 4 * index + k
-                    face = _wall(f"{name}.{k}", a, b, piece.bottom, piece.top, room, piece, style, pixel, seed, number)
-                    surfaces.append(face)
-                else:
-                    surfaces.append(_upright(f"{name}.{k}", a, b, piece, shelf))
-            surfaces += _lids(name, piece, shelf)
-        else:
-            ends = piece.footprint()
-            surfaces += [_upright(f"{name}.{k}", ends[k], ends[(k + 1) % 4], piece, shelf) for k in range(4)]
-            surfaces += _lids(name, piece, shelf)
+            continue
+        corners = piece.footprint()
+        for k, (left, right) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
+            if _is_wall(piece) and math.dist(left, right) > _NARROW:
+                number = 1000 + 4 * index + k
+                face = walls.wall(f"{name}.{k}", left, right, (piece.bottom, piece.top), number, index)
+            else:
+                face = _upright(f"{name}.{k}", left, right, piece, shelf)
+            surfaces.append(face)
+        surfaces += _lids(name, piece, shelf)
     return tuple(surfaces)
 
 
@@ -79,44 +74,49 @@ def _resolution(room: Room) -> float:
     return float(np.clip(math.sqrt(area / _PIXELS), _FINEST, _COARSEST))
 
 
-def _wall(
-    name: str, left: Floats, right: Floats, bottom: float, top: float, room: Room, own: Box | None, style: Style,
-    pixel: float, seed: int, number: int,
-) -> Surface:  # fmt: skip
-    """A wall between two points of the floor plan, as seen from the free space before it."""
-    width, height = math.dist(left, right), top - bottom
-    along = (right - left) / width
-    before = np.array([along[1], -along[0]])  # to the viewer
-    taken = _in_front(left, along, before, width, bottom, room, own)
+class _Walls:
+    """Paints the walls of one room, inner ones too."""
 
-    def free(x0: float, x1: float, z0: float, z1: float) -> bool:
-        return not any(x0 < b and a < x1 and z0 < d and c < z1 for a, b, c, d in taken)
+    def __init__(self, room: Room, pixel: float, seed: int) -> None:
+        self.style = draw_style(_kind(room), _stream(seed, 2))
+        self._pixel, self._seed = pixel, seed
+        self._footprints = np.array([_footprint(piece) for piece in room.pieces]).reshape(-1, 8, 2)
+        self._heights = np.array([(piece.bottom, piece.top) for piece in room.pieces]).reshape(-1, 2)
 
-    canvas = draw_wall(width, height, pixel, style, free, _stream(seed, 3 + number), on_floor=bottom < 0.1)
-    corner = np.array([left[0], left[1], top])
-    return Surface(
-        name, corner, np.array([*along, 0.0]), np.array([0.0, 0.0, -1.0]), width, height, canvas.image(), pixel
-    )
+    def wall(
+        self, name: str, left: Floats, right: Floats, heights: tuple[float, float], number: int, own: int | None
+    ) -> Surface:
+        """A wall between two points of the floor plan, as seen from the free space before it; `own` is its piece."""
+        bottom, top = heights
+        width = math.dist(left, right)
+        along = (right - left) / width
+        x0, x1, z0, z1 = self._in_front(left, along, width, bottom, own)
 
+        def free(a: float, b: float, c: float, d: float) -> bool:
+            return not bool(np.any((a < x1) & (x0 < b) & (c < z1) & (z0 < d)))
 
-def _in_front(
-    left: Floats, along: Floats, before: Floats, width: float, bottom: float, room: Room, own: Box | None
-) -> list[tuple[float, float, float, float]]:
-    """Rectangles of a wall (x0, x1, z0, z1, m) that pieces stand before."""
-    found = []
-    for piece in room.pieces:
-        if piece is own:
-            continue
-        off = _footprint(piece) - left
-        x, depth = off @ along, off @ before
-        if depth.min() < _DEEP and depth.max() > 0.01 and x.max() > 0 and x.min() < width:
-            found.append((float(x.min()), float(x.max()), piece.bottom - bottom, piece.top - bottom))
-    return found
+        chance = _stream(self._seed, 3 + number)
+        size = width, top - bottom
+        canvas = draw_wall(*size, self._pixel, self.style, free, chance, on_floor=bottom < 0.1)
+        corner, down = np.array([left[0], left[1], top]), np.array([0.0, 0.0, -1.0])
+        return Surface(name, corner, np.array([*along, 0.0]), down, *size, canvas.image(), self._pixel)
+
+    def _in_front(
+        self, left: Floats, along: Floats, width: float, bottom: float, own: int | None
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Bounds of the wall's rectangles that pieces stand before: x0, x1, z0, z1, m."""
+        off = self._footprints - left
+        x, depth = off @ along, off @ np.array([along[1], -along[0]])
+        near = (depth.min(axis=1) < _DEEP) & (depth.max(axis=1) > 0.01) & (x.max(axis=1) > 0) & (x.min(axis=1) < width)
+        near &= np.arange(len(off)) != (-1 if own is None else own)
+        z0, z1 = (self._heights[near] - bottom).T
+        return x[near].min(axis=1), x[near].max(axis=1), z0, z1
 
 
 def _footprint(piece: Piece) -> Floats:
+    """Eight points around a piece, some of them twice; shape (8, 2)."""
     if isinstance(piece, Box):
-        return piece.footprint()
+        return np.repeat(piece.footprint(), 2, axis=0)
     around = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
     return np.stack([piece.x + piece.radius * np.cos(around), piece.y + piece.radius * np.sin(around)], axis=1)
 
