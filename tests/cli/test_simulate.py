@@ -64,3 +64,26 @@ def test_a_folder_that_is_no_recording_is_never_replaced(failure: Failure, tmp_p
     (tmp_path / "precious.txt").write_text("mine")
     assert "no recording" in failure("simulate", "-o", tmp_path, "--duration", "1", "--overwrite")
     assert (tmp_path / "precious.txt").read_text() == "mine"
+
+
+def test_with_a_camera_the_drive_is_the_same_and_pictures_are_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("PIL", reason="needs the extra 'camera'")
+    arguments = ["simulate", "--duration", "1", "--seed", "2"]
+    assert main([*arguments, "-o", str(tmp_path / "plain")]) == 0
+    filmed = [*arguments, "-o", str(tmp_path / "filmed"), "--camera", "--camera-rate", "2", "--json"]
+    capsys.readouterr()
+    if main(filmed) != 0:
+        said = capsys.readouterr().err
+        assert "MUJOCO_GL" in said
+        pytest.skip("no graphics on this machine")
+    assert json.loads(capsys.readouterr().out)["pictures"] == 3
+    plain, recording = open_recording(tmp_path / "plain"), open_recording(tmp_path / "filmed")
+    for one, two in zip(plain.messages(), recording.messages(), strict=True):
+        assert one.stamp == two.stamp and type(one) is type(two)
+        if isinstance(one, LaserScan):
+            assert one.ranges.tobytes() == two.ranges.tobytes()
+    assert [picture.stamp for picture in recording.pictures()] == [0.0, 0.5, 1.0]
+    assert recording.camera is not None and recording.camera[0].field_of_view_deg == 220.0
+    assert plain.camera is None
