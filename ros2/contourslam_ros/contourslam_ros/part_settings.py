@@ -1,8 +1,10 @@
 """The parameters of the nodes of the robot's parts; how the robot itself is built stands in its robot.yaml."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from contourslam.errors import ConfigError
 from contourslam.robot.config import RobotConfig, load_robot
 
 
@@ -16,8 +18,6 @@ class PartConfig:
     """Frame of the robot's base."""
     frame_prefix: str = ""
     """Put before all frames, such as "robot1/", where several robots share one /tf."""
-    place_from_file: bool = True
-    """Say on /tf_static where the part sits, as the robot's file has it; off where a robot_state_publisher does."""
 
     def named(self, frame: str) -> str:
         """Put the prefix before a frame's name."""
@@ -35,7 +35,15 @@ class PartConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class LidarConfig(PartConfig):
+class SensorConfig(PartConfig):
+    """What those of a sensor have."""
+
+    place_from_file: bool = True
+    """Say on /tf_static where it sits, as the robot's file has it; off where a robot_state_publisher does."""
+
+
+@dataclass(frozen=True, slots=True)
+class LidarConfig(SensorConfig):
     """Parameters of the node ``lidar``."""
 
     port: str = ""
@@ -44,3 +52,23 @@ class LidarConfig(PartConfig):
     """Bits a second; 0 for the file's."""
     frame: str = "laser"
     """Frame of the scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class BaseNodeConfig(PartConfig):
+    """Parameters of the node ``base``."""
+
+    port: str = ""
+    """Serial port; where empty, the file's, and where that names none, found by itself."""
+    odom_frame: str = "odom"
+    """Frame in which the wheels' odometry drifts."""
+    publish_tf: bool = True
+    """Publish the transform from odom_frame to base_frame; off where a filter such as robot_localization does."""
+    stamped_cmd_vel: bool = False
+    """Commands come as TwistStamped; one whose stamp is older than cmd_vel_timeout is not obeyed."""
+    cmd_vel_timeout: float = 0.5
+    """The base is stopped when no command has come for so long, s."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.cmd_vel_timeout < math.inf:
+            raise ConfigError(f"parameter cmd_vel_timeout must be a positive number, got {self.cmd_vel_timeout!r}")

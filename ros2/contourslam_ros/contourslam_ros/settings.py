@@ -133,11 +133,12 @@ def declare(node: "Node", default: T, prefix: str = "") -> T:
 
 def _fields(config: object) -> Iterator[tuple[str, Any, str]]:
     """Yield name, value and meaning of each field; plain ones first, as YAML reads best."""
-    (body,) = (n for n in ast.parse(inspect.getsource(type(config))).body if isinstance(n, ast.ClassDef))
     meanings = {}
-    for statement, following in zip(body.body, body.body[1:], strict=False):
-        if isinstance(statement, ast.AnnAssign) and isinstance(following, ast.Expr):
-            meanings[ast.unparse(statement.target)] = str(ast.literal_eval(following.value))
+    for kind in filter(dataclasses.is_dataclass, type(config).__mro__):
+        (body,) = (n for n in ast.parse(inspect.getsource(kind)).body if isinstance(n, ast.ClassDef))
+        for statement, following in zip(body.body, body.body[1:], strict=False):
+            if isinstance(statement, ast.AnnAssign) and isinstance(following, ast.Expr):
+                meanings[ast.unparse(statement.target)] = str(ast.literal_eval(following.value))
     rows = [(f.name, getattr(config, f.name), meanings.get(f.name, "")) for f in dataclasses.fields(config)]  # type: ignore[arg-type]  # any dataclass
     yield from sorted(rows, key=lambda row: dataclasses.is_dataclass(row[1]))
 
