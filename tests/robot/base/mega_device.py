@@ -39,7 +39,7 @@ class MegaDevice:
         self._decoder = Decoder(TO_BASE)
         self._wanted, self._driven, self._tripped = np.zeros(2), 0.0, False
         self._greeted, self._last = False, 0
-        self._seen = 0
+        self._refused, self._turning = False, 0.0
 
     def reset(self) -> None:
         """Push the reset button."""
@@ -67,30 +67,28 @@ class MegaDevice:
         return [message for _, message in self.commands if isinstance(message, Drive)]
 
     def _run(self) -> None:
-        before = time.monotonic()
         while not self._ending:
             time.sleep(0.004)
             with self._lock:
                 now = time.monotonic()
-                self._move(now - before)
-                before = now
                 if now >= self._began:
                     self._work(now)
 
-    def _move(self, seconds: float) -> None:
-        for _ in range(max(1, round(seconds / 0.004))):  # a held-up machine must not make the wheels unsteady
-            step = seconds / max(1, round(seconds / 0.004))
-            self.speed += (self._wanted - self.speed) * min(1.0, step / LAG)
-            self.position += self.speed * step
+    def _move(self) -> None:
+        """Turn the wheels for one period; what is told of it then agrees, also where the machine was held up."""
+        before = self.position.copy()
+        for _ in range(10):
+            self.speed += (self._wanted - self.speed) * 0.1 * PERIOD / LAG
+            self.position += self.speed * 0.1 * PERIOD
+        left, right = (self.position - before) / PERIOD
+        self._turning = (right - left) / self._wheel_base
 
     def _work(self, now: float) -> None:
         data = self.line.receive()
         if self.garbage:
             self.line.send(b"\x55\xaa\x12" * 5)
             return
-        if self.silent:
-            return
-        if not self._greeted:
+        if not self._greeted and not self.silent:
             self._greeted = True
             self._send(self._hello())
         refused = sum(self._decoder.refused.values())
@@ -102,7 +100,9 @@ class MegaDevice:
             self.stopped_by_watchdog += 1
         while now >= self._began + (self._told + 1) * PERIOD:
             self._told += 1
-            self._send(self._state())
+            self._move()
+            if not self.silent:
+                self._send(self._state())
 
     def _obey(self, received: Received, now: float) -> None:
         message = received.message
@@ -116,7 +116,7 @@ class MegaDevice:
             self._send(Ack(received.sequence, 0))
         elif isinstance(message, Tune):
             self._send(Ack(received.sequence, 0))
-        elif isinstance(message, Hello) and not self.mute_hello:
+        elif isinstance(message, Hello) and not (self.mute_hello or self.silent):
             self._send(self._hello())
 
     def _hello(self) -> HelloReply:
@@ -124,10 +124,9 @@ class MegaDevice:
 
     def _state(self) -> State:
         left, right = ((int(t) + 2**31) % 2**32 - 2**31 for t in np.floor(self.position - self._zero))
-        turning = (self.speed[1] - self.speed[0]) / self._wheel_base
         flags = self.flags | messages.WATCHDOG * self._tripped | messages.REFUSED * self._refused
         duty = tuple(int(d) for d in np.clip(self.speed / 5.0, -1000, 1000))
-        gyro = (0, 0, round(turning * 4096) + BIAS)
+        gyro = (0, 0, round(self._turning * 4096) + BIAS)
         time_us = (self._told * 20000) % 2**32
         return State(
             time_us, (left, right), gyro, (0, 0, 9807), (0, 0, 0), self.battery, (duty[0], duty[1]), self._last, flags

@@ -99,6 +99,19 @@ def test_the_bias_is_found_at_rest_within_two_seconds_and_heading_stands_still()
     assert abs(odometer.pose[2]) < 2e-4 and not odometer.slipping
 
 
+def test_a_slow_turn_from_tick_to_tick_is_no_rest() -> None:
+    rng = np.random.default_rng(14)
+    odometer, rate, turned = settled(rng), 0.02, 0.0
+    for _ in range(1500):
+        before, turned = turned, turned + rate * STEP
+        ticks = [np.floor(side * angle * 0.5 * BASE.wheel_base / BASE.metres_per_tick[0])
+                 for side in (-1, 1) for angle in (before, turned)]  # fmt: skip
+        ways = np.array([ticks[1] - ticks[0], ticks[3] - ticks[2]]) * BASE.metres_per_tick
+        odometer.step(ways, STEP, rate + BASE.gyro_sigma / math.sqrt(STEP) * rng.normal())
+    assert odometer.pose[2] == pytest.approx(turned, abs=0.02)
+    assert odometer.bias == pytest.approx(0.0, abs=0.002)
+
+
 def test_without_a_gyroscope_the_wheels_alone_give_the_way() -> None:
     odometer = Odometer(BASE)
     for _ in range(100):

@@ -20,7 +20,10 @@ from contourslam.scan import Odometry
 Floats = NDArray[np.float64]
 
 FIRST_BIAS = 0.1  # rad/s; an MPU-9250's data sheet allows 5 degrees/s
-_REST = 1e-10  # rad², variance of a turn in one step in which no wheel moved
+_REST = 1e-10  # rad², variance of a turn in one step at rest
+# s over which the wheels' speeds are taken for their noise: a base that creeps from tick to tick does not rest between,
+# and steps with a tick must count no less than those without, or the mean of both is off.
+_STEADY = 0.3
 _WINDOW = 10  # steps over which wheels and gyroscope are held against each other
 _SLIP = 25.0  # squared standard deviations by which they then differ where a wheel slips
 _LONG = 0.2  # s; over a longer gap the way need not have been one arc
@@ -131,7 +134,8 @@ class Odometer:
         self.bias, self.slipping = 0.0, False
         # Of x, y, heading, bias, and the gyroscope's scale, which is never corrected.
         self._covariance = np.diag([1e-12, 1e-12, 1e-12, FIRST_BIAS**2, config.gyro_scale_sigma**2])
-        self._slipped = 0.0
+        self._slipped, self._rests = 0.0, True
+        self._rolled: deque[tuple[float, float, float]] = deque()
         tick = float((config.metres_per_tick**2).sum()) / 6.0  # variance of a difference of two counts, both wheels'
         self._rounding = np.diag([0.25 * tick, tick / config.wheel_base**2])  # of way and turn
         self._recent: deque[tuple[float, float, float, float]] = deque(maxlen=_WINDOW)
@@ -173,7 +177,7 @@ class Odometer:
         config, wheel_base = self._config, self._config.wheel_base
         left, right = float(ways[0]), float(ways[1])
         way, turn = 0.5 * (left + right), (right - left) / wheel_base
-        spread_left, spread_right = config.wheel_sigma**2 * abs(left), config.wheel_sigma**2 * abs(right)
+        spread_left, spread_right = self._spread(abs(left), abs(right), duration)
         self._covariance[3, 3] += config.gyro_bias_walk**2 * duration
         joint = np.zeros((8, 8))  # of the state, and of the step's way, slip aside, and turn
         joint[:5, :5] = self._covariance
@@ -188,7 +192,7 @@ class Odometer:
             self._recent.clear()
             bias, moved = self.bias, np.array([way, 0.0, turn])
         else:
-            bias, moved, joint = self._fuse(joint, way, turn, duration, rate, rate_span)
+            bias, moved, joint = self._fuse(joint, left, right, duration, rate, rate_span)
         jacobian = np.zeros((5, 8))
         jacobian[3, 3] = jacobian[4, 4] = 1.0
         along = arc_jacobian(self.pose, *moved.tolist())
@@ -199,18 +203,30 @@ class Odometer:
         self._speed, self._turn_rate = float(moved[0]) / duration, float(moved[2]) / duration
         self._twist_covariance = (joint[5::2, 5::2] + self._rounding) / duration**2
 
+    def _spread(self, left: float, right: float, duration: float) -> tuple[float, float]:
+        """Variance of the wheels' ways in this step, m², from how fast they turned lately."""
+        self._rolled.append((duration, left, right))
+        time, left, right = (sum(column) for column in zip(*self._rolled, strict=True))
+        while time - self._rolled[0][0] >= _STEADY:
+            gone = self._rolled.popleft()
+            time, left, right = time - gone[0], left - gone[1], right - gone[2]
+        self._rests = not any(a or b for _, a, b in self._rolled)
+        share = self._config.wheel_sigma**2 * duration / time
+        return share * max(left, 0.0), share * max(right, 0.0)
+
     def _fuse(
-        self, joint: Floats, way: float, turn: float, duration: float, rate: float, span: float | None
+        self, joint: Floats, left: float, right: float, duration: float, rate: float, span: float | None
     ) -> tuple[float, Floats, Floats]:
         """Correct bias, way and turn by the gyroscope; give them and their joint covariance."""
         config = self._config
+        way, turn = 0.5 * (left + right), (right - left) / config.wheel_base
         before = rate if self._rate is None else self._rate
         self._rate = rate
         missing = 0.0 if span is None else max(duration - span, 0.0)
         measured = rate * (duration - missing) + 0.5 * (rate + before) * missing
         doubt = config.gyro_sigma**2 * duration
         doubt += (missing * (0.3 * abs(rate - before) + _JERK * missing)) ** 2
-        if turn or way:  # ticks are whole, so each step is off by up to one; at rest that changes nothing
+        if not self._rests:  # ticks are whole, so that each step is off by up to one
             joint[7, 7] += self._rounding[1, 1]
         differs = measured - turn - self.bias * duration
         self._recent.append((differs, joint[7, 7] + doubt, duration, turn))
