@@ -18,7 +18,7 @@ from contourslam_ros.settings import NodeConfig
 PACKAGE = Path(__file__).parents[1] / "ros2" / "contourslam_ros"
 MESSAGES = PACKAGE.with_name("contourslam_msgs")
 LAUNCHES = {"mapping": "slam", "localization": "localization", "replay": "replay"}
-PARTS = ("lidar",)
+PARTS = ("lidar", "base")
 NAMES = {
     "launch": ["LaunchDescription"],
     "launch.actions": ["DeclareLaunchArgument"],

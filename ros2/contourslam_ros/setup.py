@@ -36,6 +36,7 @@ setup(
             f"localization = {NAME}.localization:main",
             f"replay = {NAME}.replay:main",
             f"lidar = {NAME}.lidar:main",
+            f"base = {NAME}.base:main",
         ]
     },
 )

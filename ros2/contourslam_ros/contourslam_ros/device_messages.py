@@ -16,6 +16,7 @@ from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.geometry.rigid import quaternion as quaternion_of
 from contourslam.recordings.base_readings import InertialReading, WheelReading
 from contourslam.recordings.picture import Picture
+from contourslam.recordings.ros_encoding import split_stamp
 from contourslam.recordings.ros_messages import OMNIDIRECTIONAL
 from contourslam.robot.base.odometry import BaseOdometry
 from contourslam.scan import LaserScan
@@ -26,7 +27,7 @@ Floats = NDArray[np.float64]
 
 def stamped(stamp: float, frame: str) -> Header:
     """Make a header for a time, s, that ROS can hold."""
-    seconds, nanoseconds = divmod(round(stamp * 1e9), 1_000_000_000)
+    seconds, nanoseconds = split_stamp(stamp)
     return header(Time(sec=seconds, nanosec=nanoseconds), frame)
 
 
