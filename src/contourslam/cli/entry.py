@@ -25,6 +25,7 @@ COMMANDS = {
     "world": "Write a simulated room as a world of Gazebo.",
     "lidar": "Look at a YDLidar X4 on a serial port.",
     "record": "Record the scans of a YDLidar X4.",
+    "camera": "Look at a camera, and keep pictures of it.",
     "calibrate": "Find out how a robot is built: the camera's lens and place.",
     "warm-up": "Compile everything before the robot drives.",
 }

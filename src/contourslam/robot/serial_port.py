@@ -114,14 +114,14 @@ def open_port(part: SerialPart, name: str, baud: int) -> Any:
         if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
             raise DeviceNotFoundError(f"{name}: there is no such port; {_there_are(part)}") from error
         if number in (errno.EACCES, errno.EPERM):
-            raise DevicePermissionError(f"{name}: {_join_group(name)}") from error
+            raise DevicePermissionError(f"{name}: {join_group(name)}") from error
         if number in (errno.EBUSY, errno.EAGAIN):
             raise DeviceBusyError(f"{name}: another program holds the port; end it (see `fuser {name}`)") from error
         raise DeviceError(f"{name}: cannot be opened as a serial port at {baud} baud ({error})") from error
     return port
 
 
-def _join_group(name: str) -> str:
+def join_group(name: str) -> str:
     """Say how a user comes by the right to open a device."""
     try:
         import grp

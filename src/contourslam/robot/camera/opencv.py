@@ -48,3 +48,9 @@ def decode(picture: Picture, *, grey: bool = False) -> NDArray[np.uint8] | None:
         return None
     found: NDArray[np.uint8] = pixels if grey else cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
     return found
+
+
+def encode_jpeg(pixels: NDArray[np.uint8], quality: int = 90) -> bytes:
+    """Compress pixels as OpenCV has them: blue, green, red, or brightness alone."""
+    cv2 = opencv()
+    return bytes(cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes())

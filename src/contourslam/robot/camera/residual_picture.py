@@ -39,7 +39,7 @@ def residual_picture(found: Calibration) -> bytes:
         )
         ring = np.rint(model.project(rays)[0]).astype(np.int32)
         cv2.polylines(canvas, [ring.reshape(-1, 1, 2)], False, _RINGS, 1, cv2.LINE_AA)
-        _write(canvas, f"{degrees} deg", tuple(int(value) for value in ring[45]))
+        _write(canvas, f"{degrees} deg", tuple(int(value) for value in ring[22]))
     usual = max(found.rms, 1e-3)
     enlarged = max(_LONGEST * model.width / 2.0 / usual, 1.0)
     for view in found.views:
