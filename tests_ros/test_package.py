@@ -13,12 +13,13 @@ from xml.etree import ElementTree
 import pytest
 from ruamel.yaml import YAML
 
+from contourslam_ros.part_settings import BaseNodeConfig, CameraConfig, LidarConfig
 from contourslam_ros.settings import NodeConfig
 
 PACKAGE = Path(__file__).parents[1] / "ros2" / "contourslam_ros"
 MESSAGES = PACKAGE.with_name("contourslam_msgs")
 LAUNCHES = {"mapping": "slam", "localization": "localization", "replay": "replay"}
-PARTS = ("lidar", "base")
+PARTS = {"lidar": LidarConfig, "base": BaseNodeConfig, "camera": CameraConfig}
 NAMES = {
     "launch": ["LaunchDescription"],
     "launch.actions": ["DeclareLaunchArgument"],
@@ -102,6 +103,24 @@ def test_a_launch_file_names_what_is_there(name: str, installed: Path, monkeypat
     if "rviz2" in nodes:
         ((share, *parts),) = nodes["rviz2"].named["arguments"][1].values
         assert installed.joinpath("share", *share.values, *parts).is_file()
+
+
+def test_the_whole_robot_is_started_with_parameters_that_its_nodes_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = entities("robot", monkeypatch)
+    declared = [item.values[0] for item in found if item.kind == "DeclareLaunchArgument"]
+    assert len(set(declared)) == len(declared)
+    nodes = {item.named["executable"]: item.named for item in found if item.kind == "Node"}
+    assert set(nodes) == {"slam", "rviz2", *PARTS}
+    for name, config in PARTS.items():
+        (given,) = nodes[name]["parameters"]
+        assert set(given) <= set(config.__dataclass_fields__)
+        used = [part.values[0].values[0] for part in given.values()]
+        assert nodes[name]["namespace"].values == nodes["slam"]["namespace"].values
+        assert set(used) <= set(declared)
+    # Where slam listens, the parts publish.
+    said = {name: to.values for part in PARTS for name, to in nodes[part].get("remappings", [])}
+    assert said == {name: to.values for name, to in nodes["slam"]["remappings"]}
+    assert nodes["camera"]["condition"].values[0].values == ("camera",)
 
 
 def test_rviz_shows_topics_that_the_nodes_publish_with_the_quality_of_service_they_have() -> None:

@@ -37,6 +37,7 @@ setup(
             f"replay = {NAME}.replay:main",
             f"lidar = {NAME}.lidar:main",
             f"base = {NAME}.base:main",
+            f"camera = {NAME}.camera:main",
         ]
     },
 )

@@ -72,3 +72,19 @@ class BaseNodeConfig(PartConfig):
     def __post_init__(self) -> None:
         if not 0.0 < self.cmd_vel_timeout < math.inf:
             raise ConfigError(f"parameter cmd_vel_timeout must be a positive number, got {self.cmd_vel_timeout!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class CameraConfig(SensorConfig):
+    """Parameters of the node ``camera``."""
+
+    source: str = ""
+    """picamera2, a video device, a film, a folder of pictures or a recording; where empty, the file's."""
+    rate: float = 5.0
+    """Pictures a second, wanted of a camera."""
+    frame: str = "camera_optical"
+    """Frame of the pictures: x right, y down, z out of the lens."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.rate < math.inf:
+            raise ConfigError(f"parameter rate must be a positive number, got {self.rate!r}")
