@@ -71,7 +71,9 @@ void greet() {
 bool drive(const uint8_t *payload) {
   protocol::Drive message;
   memcpy(&message, payload, sizeof message);
-  if (labs(message.left) > protocol::FASTEST || labs(message.right) > protocol::FASTEST) return false;
+  const int32_t speeds[] = {message.left, message.right};
+  for (int32_t speed : speeds)
+    if (speed < -protocol::FASTEST || speed > protocol::FASTEST) return false;
   wanted[LEFT] = message.left;
   wanted[RIGHT] = message.right;
   driven_at = ticker::now();

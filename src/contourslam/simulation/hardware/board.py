@@ -82,7 +82,7 @@ class SimulatedBoard:
     def __init__(self, board: Path, firmware: Path, options: tuple[str, ...] = ()) -> None:
         for path in (board, firmware):
             if not path.is_file():
-                raise BoardError(f"{path} is not there: run make firmware (DEVELOPMENT.md says what it needs)")
+                raise BoardError(f"{path} is not there: run make firmware (firmware/mega/README.md says what it needs)")
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close()
         command = [str(board.absolute()), *options, str(firmware)]
         pipe = subprocess.PIPE
