@@ -8,13 +8,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from types import TracebackType
-from typing import Any, Literal, Protocol, Self
+from typing import Literal, Protocol, Self
 
 from contourslam.errors import ContourslamError
 from contourslam.recordings.picture import Picture
+from contourslam.robot.base.states import BaseState
 from contourslam.robot.config import RobotConfig
 from contourslam.robot.device_errors import DeviceError
-from contourslam.scan import LaserScan, Odometry
+from contourslam.scan import LaserScan
 
 PartName = Literal["lidar", "base", "camera"]
 Stopped = Callable[[], bool]
@@ -35,11 +36,7 @@ class Lidar(Protocol):
 class Base(Protocol):
     """:class:`contourslam.robot.base.mega.MegaBase`, or what stands for it."""
 
-    @property
-    def odometry(self) -> Odometry | None:
-        """Newest reading; None before the first."""
-
-    def states(self, stopped: Stopped) -> Iterator[Any]:
+    def states(self, stopped: Stopped) -> Iterator[BaseState]:
         """Yield what the base says of itself until told to stop."""
 
     def drive(self, v: float, omega: float) -> None:
@@ -80,7 +77,7 @@ class Trouble:
     message: str
 
 
-Event = LaserScan | Odometry | Picture | Trouble
+Event = LaserScan | BaseState | Picture | Trouble
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +107,7 @@ def openers(config: RobotConfig, *, patience: float = 30.0) -> Openers:
     def base() -> Base:
         from contourslam.robot.base.mega import MegaBase
 
-        return MegaBase(config.base.port, config.base)
+        return MegaBase(config=config.base, patience=patience)
 
     def camera() -> Camera:
         raise NotImplementedError
@@ -131,7 +128,7 @@ class Robot:
 
     Attributes
     ----------
-    state : object or None
+    state : BaseState or None
         What the base said of itself last.
     """
 
@@ -140,7 +137,7 @@ class Robot:
         self._events: queue.SimpleQueue[Event | BaseException] = queue.SimpleQueue()
         self._ending = threading.Event()
         self._base: Base | None = None
-        self.state: Any = None
+        self.state: BaseState | None = None
         self._troubles: dict[PartName, str] = {}
         self._heard: set[PartName] = set()
         works: dict[PartName, Callable[[], None]] = {}
@@ -280,8 +277,7 @@ class Robot:
         try:
             for state in base.states(self._ending.is_set):
                 self.state = state
-                if base.odometry is not None:
-                    self._said("base", base.odometry)
+                self._said("base", state)
         finally:
             self._base = None
             base.close()

@@ -9,9 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-_LOST = 0.2  # share of the damaged bytes that never arrive; the others arrive as others
-
-
 @dataclass(frozen=True, slots=True)
 class Damage:
     """How a line damages bytes, each way.
@@ -19,14 +16,17 @@ class Damage:
     Attributes
     ----------
     share : float
-        Of all bytes, how many are hit; a fifth of those are lost, the others come as any other byte.
+        Of all bytes, how many are hit.
     burst : float
         How many bytes in a row are hit at a time, in the mean: 1 hits each on its own, the worst for packets; a
         motor's sparks and a full buffer hit some dozens in a row.
+    lost : float
+        Share of the bytes hit that never arrive; the others arrive as any other byte.
     """
 
     share: float = 0.0
     burst: float = 1.0
+    lost: float = 0.0
 
 
 class Noise:
@@ -59,7 +59,7 @@ class Noise:
         hit = self._hits(values.size)
         self.hit += int(hit.sum())
         changed = (values + self._chance.integers(1, 256, values.size).astype(np.uint8)).astype(np.uint8)
-        kept = ~(hit & (self._chance.random(values.size) < _LOST))
+        kept = ~(hit & (self._chance.random(values.size) < self.damage.lost))
         return np.where(hit, changed, values)[kept].tobytes()
 
     def _hits(self, count: int) -> NDArray[np.bool_]:
