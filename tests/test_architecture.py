@@ -25,10 +25,12 @@ ORDER = (
     "evaluation",
     "experiments",
     "report",
+    "view",
     "cli",
 )
 EXTRAS = {
     "serial",
+    "websockets",
     "cv2",
     "trimesh",
     "PIL",
@@ -41,7 +43,7 @@ EXTRAS = {
     "evo",
     "scipy",
 }
-MAY_USE_EXTRAS = ("graph", "robot", "scene", "simulation", "evaluation", "experiments", "report")
+MAY_USE_EXTRAS = ("graph", "robot", "scene", "simulation", "evaluation", "experiments", "report", "view")
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -17,6 +17,7 @@ COMMANDS = {
     "info": "Say what is in a recording and what is missing to map it.",
     "detect": "Draw one scan: contours, responses, corners and walls.",
     "run": "Map a recording: trajectory, corners, walls.",
+    "view": "Map a recording before your eyes, in a browser.",
     "grid": "Render the occupancy grid of a mapped recording.",
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare the landmark detectors and write the report.",

@@ -37,6 +37,7 @@ from contourslam.landmarks.detect import Lap
 from contourslam.maps.saved_map import Seen
 from contourslam.scan import LaserScan
 from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.look import Look
 from contourslam.slam.measurement import CORNER
 
 FREE = -1.0  # kind of a row of the table that holds nothing
@@ -96,12 +97,15 @@ class Landmarks:
         Everything that the keyframes saw.
     nodes : list of int
         Node of each keyframe in the tree of doubt.
+    look : Look or None
+        What the last keyframe saw.
     """
 
     def __init__(self, config: Config, detector: Detector, mount: Floats, doubt: DoubtTree) -> None:
         self._config, self._detector, self._mount, self._doubt = config, detector, mount, doubt
         self.sightings = Sightings()
         self.nodes: list[int] = []
+        self.look: Look | None = None
         self._poses: list[Floats] = []
         self.table = np.full((64, COLUMNS), FREE)
         # Of each row of the table: id (-1 in the making), sightings, misses, last keyframe that saw it, its node, and
@@ -155,7 +159,9 @@ class Landmarks:
         if graph.settled:  # else a step of iSAM2 would be due for each of them
             self._read(live[self._stale[live]], graph)
         chosen = associate(world, self.table, live, WIDE_GATES)
+        innovations = world[:, X : Y + 1] - self.table[chosen, X : Y + 1]
         matched, born = self._recognise(world, chosen, first, key, node)
+        self.look = Look(scan.stamp, found, np.where(chosen >= 0, self._ids[chosen], -1), innovations)
         missed = self._count_missed(scan, pose, live, key)
         lap("association")
         dropped = self._drop(live, key)

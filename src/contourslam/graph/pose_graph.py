@@ -55,6 +55,8 @@ class PoseGraph:
     factors, ties : gtsam.NonlinearFactorGraph
         All factors so far but those of landmarks; the ties of keyframes to places seen before are kept apart. Ties and
         landmarks can be had anew.
+    updates : int
+        How often iSAM2 has taken in what was new.
     """
 
     def __init__(self) -> None:
@@ -67,6 +69,7 @@ class PoseGraph:
         self.factors, self.ties = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph()
         self._new = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
+        self.updates = 0
 
     def add(self, key: int, pose: Floats) -> None:
         """Bring in a variable where it is thought to be."""
@@ -100,6 +103,7 @@ class PoseGraph:
 
     def update(self, more: int = 0) -> None:
         """Let iSAM2 take in what is new; `more` further steps where much has moved."""
+        self.updates += 1
         self._isam.update(self._new, self._values)
         for _ in range(more):
             self._isam.update()

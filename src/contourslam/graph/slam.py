@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Contours, Floats
 from contourslam.detectors import Detector, make_detector
 from contourslam.geometry.poses import between, between_one, compose, compose_one
 from contourslam.graph.doubt import HEADING_PER_M
@@ -23,6 +23,7 @@ from contourslam.matching.oriented import move, oriented_points
 from contourslam.matching.small import invert, moved, turned
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.look import Look
 from contourslam.slam.mapper import Finished
 from contourslam.slam.result import Loop, ScanUpdate
 from contourslam.slam.wheels import Wheels
@@ -61,6 +62,8 @@ class GraphSlam:
     memory : Memory
     settled : Settled or None
         The refined keyframes, as long as no keyframe has come after the refinement.
+    contours : Contours or None
+        Of the last scan, in the lidar's frame; None before the first.
 
     Raises
     ------
@@ -104,6 +107,8 @@ class GraphSlam:
         self._key_pose, self._key_covariance = self.start_pose, np.zeros((3, 3))
         self._travelled, self._tied_at = 0.0, -math.inf
         self._due = self._refresh_due = 0  # keyframes at which the graph is updated, and the places are moved, next
+        self.contours: Contours | None = None
+        self._standing: tuple[int, int, Floats] | None = None
         self._lap = lap
 
     def push_odometry(self, odometry: Odometry) -> None:
@@ -128,7 +133,7 @@ class GraphSlam:
         ScanUpdate
         """
         motion = self._wheels.during(scan)
-        contours = trace(scan, self.config, motion, self.mount)
+        contours = self.contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         oriented = move(oriented_points(contours), self.mount)
         increment, noise = self._wheels.step_or_guess(scan.stamp, motion)
@@ -166,9 +171,28 @@ class GraphSlam:
 
     def _map(self) -> tuple[CornerMap, WallMap]:
         if self.settled is None:
-            return self._landmarks.maps(poses_of(self._graph.estimate(len(self._keyframes)), len(self._keyframes)))
+            return self._landmarks.maps(self._stand())
         covariances = self.settled.covariances
         return self._landmarks.maps(self.settled.poses, lambda keys: covariances[keys])
+
+    def _stand(self) -> Floats:
+        """Keyframes as the graph has them now, shape (k, 3); read anew only where it has changed."""
+        count = len(self._keyframes)
+        if self._standing is None or self._standing[:2] != (count, self._graph.updates) or not self._graph.settled:
+            poses = poses_of(self._graph.estimate(count), count)
+            self._standing = count, self._graph.updates, poses
+        return self._standing[2]
+
+    @property
+    def look(self) -> Look | None:
+        """Of the last keyframe; None before the first."""
+        return self._landmarks.look
+
+    def path(self) -> Floats:
+        """Base in the world at each scan as it is seen now, shape (t, 3), for those who draw it."""
+        if not self._scans:
+            return np.empty((0, 3))
+        return self._along(self._stand() if self.settled is None else self.settled.poses)
 
     def finish(self) -> Finished:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
@@ -186,7 +210,7 @@ class GraphSlam:
             covariances = [moved(poses[key], marginals[key], seen, still)[1] for key, seen, _ in self._scans]
         else:
             poses = poses_of(self._graph.estimate(count), count)
-        return Finished(self._along(poses), np.array(covariances), self._loops())
+        return Finished(self._along(poses), np.array(covariances), self.loops())
 
     def _along(self, keys: Floats) -> Floats:
         """Poses of all scans between those of the keyframes: carried on from the one before, and to the one after."""
@@ -201,9 +225,10 @@ class GraphSlam:
         weight = np.where(after > which, (np.arange(len(which)) - begin) / count, 0.0)
         return compose(poses, between(poses, other) * weight[:, None])
 
-    def _loops(self) -> tuple[Loop, ...]:
+    def loops(self, first: int = 0) -> tuple[Loop, ...]:
+        """Loops closed so far, in the order in which they were found, from number `first` on."""
         loops = []
-        for (keyframe, tie), covariance in zip(self._ties, self._tie_covariances, strict=True):
+        for (keyframe, tie), covariance in zip(self._ties[first:], self._tie_covariances[first:], strict=True):
             place = self._places.list[tie.place]
             loops.append(
                 Loop(

@@ -17,9 +17,10 @@ from contourslam.slam.contour_motion import ContourMotion, ContourStep
 from contourslam.slam.landmark_filter import LandmarkFilter
 from contourslam.slam.landmark_life import Nursery, bear, drop_unseen, merge_twins
 from contourslam.slam.landmark_map import CornerMap, WallMap
+from contourslam.slam.look import Look
 from contourslam.slam.measurement import predict_measurements
 from contourslam.slam.motion import predict
-from contourslam.slam.observation import Observations, loosened, observe, to_world
+from contourslam.slam.observation import X1, Y1, Observations, loosened, observe, to_world
 from contourslam.slam.result import ScanUpdate
 from contourslam.slam.visibility import by_angle, expected_in_scan
 from contourslam.slam.wheels import Wheels
@@ -60,6 +61,10 @@ class ContourSlam:
         The state, changed in place by every scan.
     mount, start_pose : ndarray, shape (3,)
         ``T_base_lidar``, and the pose of the base where it started.
+    contours : Contours or None
+        Of the last scan, in the lidar's frame; None before the first.
+    look : Look or None
+        Of the last scan in which landmarks were looked for.
 
     Raises
     ------
@@ -87,6 +92,8 @@ class ContourSlam:
         self._way = LOOK_EVERY  # driven since landmarks were last looked for
         self._linearised_at = self.filter.pose
         self._nursery = Nursery()
+        self.contours: Contours | None = None
+        self.look: Look | None = None
         self._lap = lap
 
     def push_odometry(self, odometry: Odometry) -> None:
@@ -106,7 +113,7 @@ class ContourSlam:
         ScanUpdate
         """
         motion = self._wheels.during(scan)
-        contours = trace(scan, self.config, motion, self.mount)
+        contours = self.contours = trace(scan, self.config, motion, self.mount)
         self._lap("contour")
         step = self._predict(scan, motion, contours)
         self._way += LOOK_EVERY if step is None else step.moved
@@ -123,6 +130,9 @@ class ContourSlam:
         chosen = self._associate(seen, world, model, may_slip=step is None or not step.aligned)
         self._lap("association")
         matched = (chosen >= 0).nonzero()[0]
+        at = 3 + 2 * chosen
+        innovations = world[:, (X1, Y1)] - self.filter.mean[np.stack((at, at + 1), axis=1)]
+        self.look = Look(scan.stamp, found, np.where(chosen >= 0, self.filter.ids[chosen], -1), innovations)
         nis = self._correct(matched, chosen[matched], seen.values, alike * seen.noises, model)
         self._lap("correction")
         missed = self._count_sightings(scan, chosen[matched], world[matched])

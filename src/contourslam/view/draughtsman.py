@@ -1,0 +1,64 @@
+"""Draws up the maps of all lanes, as seldom as must be for the mapping not to wait."""
+
+import time
+from collections.abc import Callable, Sequence
+
+from contourslam.view.lane import Lane
+from contourslam.view.memory import Memory
+from contourslam.view.wire import pack
+
+PAUSE = 0.25  # s between two maps of one lane, at least
+REST, REST_LOOP, REST_IDLE = 40.0, 5.0, 3.0  # times as long as it takes to draw a map, no other of the lane is drawn
+
+
+class Draughtsman:
+    """Decides when a lane's map is drawn; changed in place.
+
+    Parameters
+    ----------
+    lanes : sequence of Lane
+    memory : Memory
+        Where the maps go.
+    clock : callable
+    """
+
+    def __init__(self, lanes: Sequence[Lane], memory: Memory, clock: Callable[[], float] = time.monotonic) -> None:
+        self._lanes, self._memory, self._clock = lanes, memory, clock
+        self._ended, self._took = [-1e9] * len(lanes), [0.0] * len(lanes)
+        self._wanted, self._urgent = [False] * len(lanes), [False] * len(lanes)
+
+    def want(self, lane: int, urgent: bool, wanted: bool) -> None:
+        """Say that a lane's map has changed, or has moved as a whole, which is urgent."""
+        self._urgent[lane] |= urgent
+        self._wanted[lane] |= urgent or wanted
+
+    def work(self, elapsed: float, *, idle: bool) -> bool:
+        """Draw one map where one is due; True where one was.
+
+        Parameters
+        ----------
+        elapsed : float
+            Time of the last scan, s.
+        idle : bool
+            No scan waits.
+        """
+        now = self._clock()
+        for number in range(len(self._lanes)):
+            if not self._wanted[number]:
+                continue
+            rest = REST_LOOP if self._urgent[number] else REST_IDLE if idle else REST
+            if now >= self._ended[number] + max(PAUSE, rest * self._took[number]):
+                self.draw(number, elapsed)
+                return True
+        return False
+
+    def draw(self, number: int, elapsed: float) -> None:
+        """Draw a lane's map now."""
+        began = self._clock()
+        scans = self._memory.knot_scans()
+        arrays = self._lanes[number].draw(scans)
+        message = pack("map", {"lane": number, "elapsed": elapsed}, arrays)
+        self._memory.add_map(number, elapsed, len(scans), message)
+        self._wanted[number] = self._urgent[number] = False
+        self._ended[number] = self._clock()
+        self._took[number] = self._ended[number] - began

@@ -1,0 +1,196 @@
+// The page: takes what the server sends, and draws the newest of it.
+
+import { Camera } from "./camera.js";
+import { colour, forgetColours } from "./colours.js";
+import { Link } from "./link.js";
+import { LAYERS, LaneMap } from "./map.js";
+import { Model } from "./model.js";
+import { drawPanels, drawStatus } from "./panels.js";
+import { Transport } from "./transport.js";
+
+const $ = (id) => document.getElementById(id);
+const PANELS = 120; // ms between two drawings of what stands beside the map
+const store = {
+  get: (key, otherwise) => { try { return localStorage.getItem(key) ?? otherwise; } catch { return otherwise; } },
+  set: (key, value) => { try { localStorage.setItem(key, value); } catch { /* private windows have no store */ } },
+};
+
+const model = new Model();
+const camera = new Camera(() => { toolbar(); ask(); });
+const layers = Object.fromEntries(LAYERS.map(([key, , , on]) => [key, store.get(`layer.${key}`, String(on)) === "true"]));
+let maps = [], selected = null, undrawn = null, asked = false, panelsAt = 0, panelsWait = null, statusNew = false;
+
+const link = new Link({
+  message(message) {
+    model.take(message);
+    if (message.kind === "hello") hello();
+    if (message.kind === "frame") undrawn = message.index;
+    if (message.kind === "status") statusNew = true;
+    ask();
+  },
+  opened() { $("link").dataset.on = "yes"; $("link").title = "connected"; },
+  closed() {
+    $("link").dataset.on = "no";
+    $("link").title = "not connected; trying again";
+    $("state").textContent = "not connected";
+    $("state").dataset.tone = "bad";
+  },
+});
+const send = (...request) => link.send(...request);
+const transport = new Transport(model, send);
+
+/** The connection is new: all that was known is sent again. */
+function hello() {
+  const { about } = model;
+  $("title").textContent = `${about.title} · ${about.back_end === "graph" ? "graph" : "EKF"}`;
+  document.title = `${about.title} – contourslam`;
+  const same = maps.length === about.lanes.length;
+  if (!same) {
+    maps = about.lanes.map((name, lane) => new LaneMap(lane, name, camera, choose));
+    $("lanes").replaceChildren(...maps.map((map) => map.figure));
+    $("lanes").dataset.count = $("stage").dataset.count = maps.length;
+    maps.forEach((map) => resized.observe(map.canvas));
+  }
+  maps.forEach((map) => map.forget());
+  model.events = [];
+  $("events").replaceChildren();
+  if (selected) send("story", selected.id, { lane: selected.lane });
+}
+
+/** Draw at the next chance. */
+function ask() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(draw);
+}
+
+function draw(now) {
+  asked = false;
+  if (statusNew && model.status) {
+    statusNew = false;
+    for (const event of model.newEvents) {
+      if (event.what === "loop" && model.frame && Math.abs(event.elapsed - model.frame.elapsed) < 60) {
+        maps[event.lane]?.flash(event.x, event.y);
+      }
+    }
+    drawStatus(model, (time) => send("seek", time));
+    model.newEvents = [];
+  }
+  if (!model.about || !model.frame) return;
+  $("waiting").hidden = true;
+  if (camera.mode === "follow") [camera.x, camera.y] = model.frame.lanes[0].pose;
+  if (camera.mode === "fit") camera.fit(maps[0].box(model), maps[0].canvas.clientWidth, maps[0].canvas.clientHeight);
+  let moving = false;
+  for (const map of maps) moving = map.draw(model, layers, selected) || moving;
+  legend();
+  transport.draw();
+  if (now - panelsAt > PANELS) {
+    panelsAt = now;
+    drawPanels(model, selected);
+  } else {
+    panelsWait ??= setTimeout(() => { panelsWait = null; ask(); }, PANELS + 5 - (now - panelsAt));
+  }
+  if (undrawn !== null) {
+    send("drawn", undrawn);
+    undrawn = null;
+  }
+  if (moving) ask();
+}
+
+function legend() {
+  const lift = maps[0].lift, large = lift > 1 ? `, drawn ${lift} times larger` : "";
+  const line = layers.corners ? `Corner ellipses: 3σ${large} · robot: 3σ` : "Robot: 3σ";
+  if ($("legend").textContent !== line) $("legend").textContent = line;
+}
+
+/** A tap on a map: the corner there, or none. */
+function choose(lane, point) {
+  const id = maps[lane].cornerAt(model, point);
+  select(id < 0 ? null : { lane, id });
+}
+
+function select(corner) {
+  selected = corner;
+  send("story", corner ? corner.id : -1, { lane: corner ? corner.lane : 0 });
+  model.story = null;
+  panelsAt = 0;
+  if (corner) $("side").scrollTop = 0;
+  ask();
+}
+
+function toolbar() {
+  $("fit").setAttribute("aria-pressed", camera.mode === "fit");
+  $("follow").setAttribute("aria-pressed", camera.mode === "follow");
+}
+
+const resized = new ResizeObserver(ask);
+
+for (const [key, label, tint] of LAYERS) {
+  const row = document.createElement("label"), box = document.createElement("input"), line = document.createElement("i");
+  Object.assign(box, { type: "checkbox", checked: layers[key] });
+  box.dataset.layer = key;
+  line.style.setProperty("--c", `var(--${tint})`);
+  box.onchange = () => {
+    layers[key] = box.checked;
+    store.set(`layer.${key}`, box.checked);
+    ask();
+  };
+  row.append(box, line, label);
+  $("layerlist").append(row);
+}
+
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  forgetColours();
+  ask();
+}
+const system = matchMedia("(prefers-color-scheme: dark)");
+const theme = () => store.get("theme", system.matches ? "dark" : "light");
+system.addEventListener("change", () => setTheme(theme()));
+$("theme").onclick = () => {
+  store.set("theme", document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  setTheme(theme());
+};
+setTheme(theme());
+
+$("fit").onclick = () => camera.setMode("fit");
+$("follow").onclick = () => {
+  camera.scale = Math.max(camera.scale, 45);
+  camera.setMode("follow");
+};
+$("closer").onclick = () => camera.zoom(1.4);
+$("wider").onclick = () => camera.zoom(1 / 1.4);
+$("cornerclose").onclick = () => select(null);
+$("goto").onchange = () => {
+  const id = Number($("goto").value);
+  const lane = model.maps.findIndex((map) => map && map.byId.has(id));
+  if ($("goto").value === "" || lane < 0) return;
+  const at = model.maps[lane].byId.get(id);
+  camera.mode = "free";
+  [camera.x, camera.y] = model.maps[lane].corners.subarray(2 * at, 2 * at + 2);
+  camera.scale = Math.max(camera.scale, 60);
+  toolbar();
+  select({ lane, id });
+};
+
+document.addEventListener("keydown", (event) => {
+  if (event.target.closest("input, select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === " " && event.target.closest("button, summary")) return;
+  const keys = {
+    " ": () => transport.toggle(),
+    ArrowLeft: () => send("step", event.shiftKey ? -10 : -1),
+    ArrowRight: () => send("step", event.shiftKey ? 10 : 1),
+    f: () => $("follow").click(),
+    0: () => $("fit").click(),
+    "+": () => $("closer").click(),
+    "-": () => $("wider").click(),
+    Escape: () => select(null),
+  };
+  const act = keys[event.key];
+  if (!act) return;
+  event.preventDefault();
+  act();
+});
+
+// For those who test the page.
+window.contourslam = { model, camera, link, get selected() { return selected; }, get maps() { return maps; } };
