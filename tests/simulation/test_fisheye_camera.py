@@ -17,7 +17,7 @@ from contourslam.errors import ConfigError, MissingExtraError, ResultError
 from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.geometry.rigid import from_planar, inverse
 from contourslam.scan import Odometry
-from contourslam.simulation import camera as camera_module
+from contourslam.simulation import offscreen
 from contourslam.simulation.camera import FisheyeCamera, _develop
 from contourslam.simulation.config import CameraModel, SimulationConfig
 from contourslam.simulation.filming import film
@@ -184,7 +184,7 @@ def test_a_pose_in_the_plane_is_the_same_as_its_matrix_and_a_tilt_is_not(even: F
 @pytest.mark.parametrize("pose", [[0.0, 1.0], [0.0, np.nan, 1.0], np.eye(3)])
 def test_a_pose_that_is_none_is_refused(even: FisheyeCamera, pose: object) -> None:
     with pytest.raises(ConfigError, match="base pose"):
-        even.render(pose)  # type: ignore[arg-type]  # wrong on purpose
+        even.render(pose)
 
 
 def test_another_thread_is_told_that_the_graphics_are_not_its_own(even: FisheyeCamera) -> None:
@@ -206,7 +206,7 @@ def test_without_graphics_the_error_says_so(textures: RoomTextures, monkeypatch:
     def no_library(width: int, height: int) -> None:
         raise ImportError("Cannot initialize a EGL device display")
 
-    monkeypatch.setattr(camera_module, "open_context", no_library)
+    monkeypatch.setattr(offscreen, "open_context", no_library)
     with FisheyeCamera(textures, EVEN) as camera, pytest.raises(ResultError, match=r"EGL.*MUJOCO_GL=osmesa"):
         camera.open()
 
@@ -271,4 +271,4 @@ def test_the_developing_kernel_does_as_numpy_does() -> None:
 @pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"noise": -1.0}, {"vignetting": 1.5}, {"jpeg_quality": 100}])
 def test_a_camera_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match=f"CameraModel.{next(iter(wrong))}"):
-        CameraModel(**wrong)  # type: ignore[arg-type]  # a name and a value of it
+        CameraModel(**wrong)

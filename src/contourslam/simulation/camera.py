@@ -5,9 +5,8 @@ sees, and every pixel of the picture is looked up in them along its own ray.
 """
 
 import math
-import threading
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +20,7 @@ from contourslam.simulation.chance import CAMERA
 from contourslam.simulation.config import CameraModel, RobotModel
 from contourslam.simulation.cube import Face, cube_faces
 from contourslam.simulation.mjcf import import_mujoco
-from contourslam.simulation.offscreen import drawing_errors, open_context
+from contourslam.simulation.offscreen import CubeDrawing, drawing_errors
 from contourslam.simulation.room import Room
 from contourslam.simulation.textured_world import compile_textured_world
 from contourslam.simulation.textures import RoomTextures, room_textures
@@ -81,7 +80,7 @@ class FisheyeCamera:
         self._faces, self._columns, self._rows, self._factors = _plan(self.camera)
         self._model = compile_textured_world(self.textures, self.robot, self.T_base_camera)
         self._data = self._mujoco.MjData(self._model)
-        self._graphics: _Graphics | None = None
+        self._graphics: CubeDrawing | None = None
         self.taken = 0
 
     @property
@@ -192,55 +191,11 @@ class FisheyeCamera:
     def _drawn(self, T_world_camera: Floats) -> Bytes:
         try:
             if self._graphics is None:
-                self._graphics = _Graphics(self._mujoco, self._model, self._faces)
+                self._graphics = CubeDrawing(self._mujoco, self._model, self._faces)
             return self._graphics.draw(self._data, T_world_camera)
         except drawing_errors(self._mujoco) as error:
             name = self.textures.room.name
             raise ResultError(f"no camera picture of room {name}: {error}; try MUJOCO_GL=osmesa") from error
-
-
-class _Graphics:
-    """A graphics context with the model's textures in it, and the sheet on which the faces are drawn side by side."""
-
-    def __init__(self, mujoco: Any, model: Any, faces: tuple[Face, ...]) -> None:
-        self._mujoco, self._model, self._faces = mujoco, model, faces
-        self._thread = threading.get_ident()
-        width, height = faces[-1].left + faces[-1].columns, max(face.rows for face in faces)
-        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-        self._window = open_context(width, height)
-        self._window.make_current()
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
-        flags = mujoco.mjtRndFlag
-        for flag in (flags.mjRND_SHADOW, flags.mjRND_REFLECTION, flags.mjRND_SKYBOX, flags.mjRND_HAZE):
-            self._scene.flags[flag] = 0
-        self._options, self._perturb, self._camera = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera()
-        self._sheet = np.zeros((height, width, 3), dtype=np.uint8)
-
-    def draw(self, data: Any, T_world_camera: Floats) -> Bytes:
-        """Draw all faces; returns the sheet, its lowest row first, valid until the next call."""
-        if threading.get_ident() != self._thread:
-            raise RuntimeError("its graphics belong to the thread that took the first picture")
-        mujoco, scene = self._mujoco, self._scene
-        self._window.make_current()
-        every = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self._model, data, self._options, self._perturb, self._camera, every, scene)
-        for face in self._faces:
-            _, up, forward = (T_world_camera[:3, :3] @ face.axes).T
-            for eye in scene.camera:
-                eye.pos[:], eye.forward[:], eye.up[:] = T_world_camera[:3, 3], forward, up
-                eye.frustum_near, eye.frustum_far = face.near, face.far
-                eye.frustum_center = face.near * face.middle
-                eye.frustum_bottom, eye.frustum_top = face.near * face.bottom, face.near * face.top
-            mujoco.mjr_render(mujoco.MjrRect(face.left, 0, face.columns, face.rows), scene, self._context)
-        whole = mujoco.MjrRect(0, 0, self._sheet.shape[1], self._sheet.shape[0])
-        mujoco.mjr_readPixels(self._sheet, None, whole, self._context)
-        return self._sheet
-
-    def close(self) -> None:
-        self._context.free()
-        self._window.free()
 
 
 def _plan(camera: CameraModel) -> tuple[tuple[Face, ...], Singles, Singles, Singles]:

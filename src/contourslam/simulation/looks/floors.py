@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from contourslam.simulation.looks import materials
 from contourslam.simulation.looks.canvas import Canvas, Pixels
+from contourslam.simulation.looks.surface import Surface
 from contourslam.simulation.looks.walls import Kind
 from contourslam.simulation.pieces import Box
 from contourslam.simulation.room import Room
-from contourslam.simulation.textures import Surface
 
 Floats = NDArray[np.float64]
 _CEILING_PIXEL = 0.02  # m; nothing on a ceiling is fine

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from contourslam.simulation.chance import LOOKS
 from contourslam.simulation.looks.floors import draw_ceiling, draw_floor
 from contourslam.simulation.looks.furniture import Shelf
+from contourslam.simulation.looks.surface import Surface
 from contourslam.simulation.looks.walls import Kind, draw_style, draw_wall
 from contourslam.simulation.pieces import WHITE, Box, Cylinder, Piece
 from contourslam.simulation.room import Room
-from contourslam.simulation.textures import Surface
 
 Floats = NDArray[np.float64]
 _FINEST, _COARSEST, _PIXELS = 0.005, 0.02, 9e6  # m per pixel, and pixels in all
