@@ -17,7 +17,7 @@ from contourslam.robot.config import RobotConfig
 from contourslam.robot.device_errors import DeviceError
 from contourslam.scan import LaserScan
 
-PartName = Literal["lidar", "base", "camera"]
+PartName = Literal["lidar", "base", "camera", "recording"]
 Stopped = Callable[[], bool]
 _RETRY = 1.0  # s between two tries to open a part that failed
 _READY = 15.0  # s until each part must have said something: an X4 needs one to turn, a Mega up to three to start
@@ -50,9 +50,9 @@ class Base(Protocol):
 
 
 class Camera(Protocol):
-    """A source of pictures."""
+    """:class:`contourslam.robot.camera.source.PictureSource`, or what stands for it."""
 
-    def pictures(self, stopped: Stopped) -> Iterator[Picture]:
+    def frames(self, stopped: Stopped) -> Iterator[Picture]:
         """Yield pictures until told to stop."""
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ class Openers:
     camera: Callable[[], Camera] | None = None
 
 
-def openers(config: RobotConfig, *, patience: float = 30.0) -> Openers:
+def openers(config: RobotConfig, *, patience: float = 30.0, rate: float = 2.0) -> Openers:
     """Give the ways to open the parts that a robot has.
 
     Parameters
@@ -97,6 +97,8 @@ def openers(config: RobotConfig, *, patience: float = 30.0) -> Openers:
     config : RobotConfig
     patience : float
         How long a part that was unplugged is waited for before its trouble is told, s; it is waited for after that too.
+    rate : float
+        Pictures a second that are wanted of the camera.
     """
 
     def lidar() -> Lidar:
@@ -110,7 +112,11 @@ def openers(config: RobotConfig, *, patience: float = 30.0) -> Openers:
         return MegaBase(config=config.base, patience=patience)
 
     def camera() -> Camera:
-        raise NotImplementedError
+        from contourslam.robot.camera.sources import open_source
+
+        assert config.camera is not None
+        model = config.camera.model
+        return open_source(config.camera.source, width=model.width, height=model.height, rate=rate, patience=patience)
 
     return Openers(lidar, base, None if config.camera is None else camera)
 
@@ -130,13 +136,17 @@ class Robot:
     ----------
     state : BaseState or None
         What the base said of itself last.
+    lidar, base : Lidar or None, Base or None
+        The part as it was opened last, for its counters.
     """
 
     def __init__(self, parts: Openers, *, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
         self._events: queue.SimpleQueue[Event | BaseException] = queue.SimpleQueue()
         self._ending = threading.Event()
-        self._base: Base | None = None
+        self._base: Base | None = None  # while it is open
+        self.lidar: Lidar | None = None
+        self.base: Base | None = None
         self.state: BaseState | None = None
         self._troubles: dict[PartName, str] = {}
         self._heard: set[PartName] = set()
@@ -264,7 +274,7 @@ class Robot:
         self._heard.add(name)
 
     def _lidar(self, opened: Callable[[], Lidar]) -> None:
-        lidar = opened()
+        self.lidar = lidar = opened()
         try:
             for scan in lidar.scans(self._ending.is_set):
                 self._said("lidar", scan)
@@ -272,8 +282,7 @@ class Robot:
             lidar.close()
 
     def _drive_base(self, opened: Callable[[], Base]) -> None:
-        base = opened()
-        self._base = base
+        self._base = self.base = base = opened()
         try:
             for state in base.states(self._ending.is_set):
                 self.state = state
@@ -285,7 +294,7 @@ class Robot:
     def _camera(self, opened: Callable[[], Camera]) -> None:
         camera = opened()
         try:
-            for picture in camera.pictures(self._ending.is_set):
+            for picture in camera.frames(self._ending.is_set):
                 self._said("camera", picture)
         finally:
             camera.close()

@@ -99,6 +99,12 @@ class LiveMap:
         x, y, heading = compose(T_map_odom, newest.pose).tolist()
         return x, y, heading
 
+    @property
+    def latencies(self) -> Floats:
+        """From each scan's coming to its pose, s, shape (t,)."""
+        with self._lock:
+            return np.array([processed.latency for processed, _ in self._done])
+
     def close(self) -> None:
         """Let the last scan be mapped, and end the thread."""
         self._worker.stop()

@@ -23,7 +23,7 @@ def square_room(bearing: Floats) -> Floats:
     """Range (m) counter-clockwise bearing by bearing in a room of 4 m by 6 m, 1.5 m from its rear wall."""
     c, s = np.cos(bearing), np.sin(bearing)
     with np.errstate(divide="ignore"):
-        return np.minimum.reduce([np.where(c > 0, 4.5 / c, -1.5 / c), np.where(s > 0, 2.0 / s, -2.0 / s)])
+        return np.asarray(np.minimum.reduce([np.where(c > 0, 4.5 / c, -1.5 / c), np.where(s > 0, 2.0 / s, -2.0 / s)]))
 
 
 def measured(raw_deg: Floats, ranges: Callable[[Floats], Floats]) -> Floats:
@@ -31,7 +31,7 @@ def measured(raw_deg: Floats, ranges: Callable[[Floats], Floats]) -> Floats:
     mm = np.full(raw_deg.shape, 2000.0)
     for _ in range(30):
         mm = 1000.0 * ranges(-np.radians(raw_deg + correction_deg(mm)))
-    return np.rint(mm)
+    return np.asarray(np.rint(mm))
 
 
 class PluggedX4:

@@ -148,7 +148,8 @@ class _Conductor:
             self._tell_pose(now)
         try:
             while self._orders.poll():
-                self._obey(*self._orders.recv(), now)
+                order, value = self._orders.recv()
+                self._obey(order, value, now)
         except (EOFError, OSError):  # nobody is there any more
             self._ended = True
 

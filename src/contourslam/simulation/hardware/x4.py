@@ -102,7 +102,8 @@ class X4:
         self.commands: list[int] = []
         self._heard = b""
         self._stream: Iterator[tuple[float, Callable[[], bytes]]] = iter(())
-        self._due, self._make = math.inf, bytes
+        self._due = math.inf
+        self._make: Callable[[], bytes] = bytes
 
     @property
     def due(self) -> float:

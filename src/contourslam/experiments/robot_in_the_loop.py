@@ -1,0 +1,347 @@
+"""The whole robot at real time, its devices simulated down to their bytes: a function from configuration to result."""
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.config import Config, LiveConfig, SlamConfig
+from contourslam.errors import ConfigError
+from contourslam.evaluation.errors import rmse
+from contourslam.experiments.known_room import told
+from contourslam.geometry.poses import interpolate
+from contourslam.live.warming import warm_up
+from contourslam.recordings.picture import Picture
+from contourslam.recordings.writer import RecordingWriter
+from contourslam.robot.base.mega import MegaBase
+from contourslam.robot.bring_up import Event, Openers, Robot, Trouble, openers
+from contourslam.robot.config import BaseConfig, CameraPart, LidarPart, RobotConfig
+from contourslam.robot.journey import Journey, Sight, Twist
+from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
+from contourslam.robot.live_map import LiveMap
+from contourslam.robot.pilot import Pilot, PilotConfig
+from contourslam.robot.route import sample_route
+from contourslam.simulation.config import YDLIDAR_X4, CameraModel, RobotModel
+from contourslam.simulation.hardware.board import SimulatedBoard
+from contourslam.simulation.hardware.line import Damage
+from contourslam.simulation.hardware.live_world import Record, WorldConfig
+from contourslam.simulation.hardware.running_world import RunningWorld
+from contourslam.simulation.hardware.simulated_camera import SimulatedCamera
+from contourslam.simulation.room import Room
+from contourslam.simulation.rooms import ROOMS
+from contourslam.slam.result import RunResult
+
+Floats = NDArray[np.float64]
+Fault = Literal["none", "unplugged", "damaged"]
+FAULTS: dict[Fault, str] = {
+    "none": "nothing",
+    "unplugged": "the lidar is unplugged for 3 s in the middle of the drive",
+    "damaged": "5 % of all bytes on both serial lines are damaged, both ways, from the first metre on",
+}
+UNPLUGGED = 3.0
+"""s."""
+DAMAGE = Damage(0.05)
+"""Each byte on its own, which is harder on packets than bursts."""
+STANDS = 2.0
+"""The robot stands for this long at first, s: the gyroscope's bias is found, and the map begins."""
+LIVE = LiveConfig(wait=0.6, max_waiting=10)
+"""Where nine of ten frames of the base are damaged, odometry comes a few times a second; a scan waits for it."""
+SETTINGS = Config(slam=SlamConfig(walls=True, contour_matching=True), back_end="graph")
+
+
+@dataclass(frozen=True, slots=True)
+class LoopConfig:
+    """One drive of the whole robot."""
+
+    seed: int = 1
+    """Of all that chance decides."""
+    room: str = "furnished_room"
+    """One of the simulated rooms."""
+    seconds: float = 100.0
+    """How long it drives, s."""
+    fault: Fault = "none"
+    """What goes wrong."""
+    speed: float = 0.3
+    """m/s."""
+    pictures: float = 1.0
+    """Pictures a second; 0 for no camera."""
+    settings: Config = field(default_factory=lambda: SETTINGS)
+    """Of the mapping."""
+
+    def __post_init__(self) -> None:
+        if self.room not in ROOMS:
+            raise ConfigError(f"there is no room {self.room!r}; choose one of {', '.join(ROOMS)}")
+        if self.fault not in FAULTS:
+            raise ConfigError(f"there is no fault {self.fault!r}; choose one of {', '.join(FAULTS)}")
+        if not self.seconds >= 5.0:
+            raise ConfigError(f"LoopConfig.seconds must be at least 5, got {self.seconds!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Firmware:
+    """What ``make firmware`` builds."""
+
+    board: Path
+    """The program that simulates the board."""
+    elf: Path
+    """What the board executes."""
+
+    @classmethod
+    def built_in(cls, folder: Path) -> "Firmware":
+        """Give what stands in the folder that it is built in."""
+        return cls(folder / "board", folder / "mega.elf")
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """What the drivers counted.
+
+    Attributes
+    ----------
+    packets, packets_failed : int
+        Of the lidar.
+    reconnections : int
+        How often the lidar's port was opened anew.
+    states, frames_refused : int
+        Of the base: STATEs that came, and frames that came damaged.
+    watchdog_stops, resets : int
+        How often the base stopped by itself, and began anew.
+    """
+
+    packets: int
+    packets_failed: int
+    reconnections: int
+    states: int
+    frames_refused: int
+    watchdog_stops: int
+    resets: int
+
+
+@dataclass(frozen=True, slots=True)
+class LoopResult:
+    """What came out.
+
+    Attributes
+    ----------
+    config : LoopConfig
+    settings : Config
+        Of the mapping, as they were.
+    run : RunResult
+        With the true poses.
+    record : Record
+        What really happened, and how punctually.
+    counters : Counters
+    latencies : ndarray, shape (t,)
+        From a scan's coming to its pose, s.
+    busy : float
+        CPU seconds of the robot's own computer for a second: drivers, mapping, steering.
+    travelled : float
+        m.
+    troubles : tuple of Trouble
+    pictures : tuple of Picture
+        At most :data:`KEPT` of them, spread over the drive.
+    picture_count : int
+    """
+
+    config: LoopConfig
+    settings: Config
+    run: RunResult
+    record: Record
+    counters: Counters
+    latencies: Floats
+    busy: float
+    travelled: float
+    troubles: tuple[Trouble, ...]
+    pictures: tuple[Picture, ...]
+    picture_count: int
+
+    @property
+    def online(self) -> dict[str, float]:
+        """RMSE of the poses as they were known at the time, by which the robot drove: x, y (m), theta (rad)."""
+        run = self.run
+        return _rmse(run.poses if run.online_poses is None else run.online_poses, run.truth)
+
+    @property
+    def revised(self) -> dict[str, float]:
+        """RMSE of the poses as the whole drive shows them."""
+        return _rmse(self.run.poses, self.run.truth)
+
+    @property
+    def late(self) -> float:
+        """Share of the world's steps that were done more than 20 ms after their time."""
+        return self.record.late / max(self.record.steps, 1)
+
+
+KEPT = 8
+
+
+def robot_in_the_loop(
+    config: LoopConfig,
+    firmware: Firmware,
+    *,
+    recording: Path | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> LoopResult:
+    """Let the robot drive: real drivers, real firmware, real mapping; the world and the wires are simulated.
+
+    Parameters
+    ----------
+    config : LoopConfig
+    firmware : Firmware
+    recording : Path, optional
+        Where all that the robot sensed is recorded, the true poses left out.
+    progress : callable
+        Called with the share done.
+    stopped : callable
+        Ends the drive early.
+
+    Returns
+    -------
+    LoopResult
+
+    Raises
+    ------
+    ContourslamError
+        If the firmware is not built, an extra is missing, or a part does not come up.
+    """
+    room = ROOMS[config.room]
+    settings = told(config.settings, YDLIDAR_X4)
+    warm_up(settings)  # nothing may be compiled while scans wait
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="contourslam-")))
+        camera = stack.enter_context(_camera(room, config)) if config.pictures else None
+        world = stack.enter_context(
+            RunningWorld(
+                WorldConfig(room, config.seed),
+                partial(SimulatedBoard, firmware.board, firmware.elf),
+                folder,
+                poses=None if camera is None else camera.poses,
+                period=1.0 / config.pictures if config.pictures else 1.0,
+            )
+        )
+        parts = robot_config(config, world.lidar_port, world.base_port)
+        opened = openers(parts)
+        if camera is not None:
+            opened = replace(opened, camera=lambda: camera)
+        return _drive(config, settings, parts, opened, world, recording, progress, stopped, stack)
+
+
+def robot_config(config: LoopConfig, lidar: Path, base: Path) -> RobotConfig:
+    """Say how the robot takes itself to be built: radii and wheel base are up to 1 % wrong, by seed."""
+    model, wrong = RobotModel(), 1.0 + np.random.default_rng([config.seed, 107]).uniform(-0.01, 0.01, 3)
+    eye = CameraModel()
+    camera = CameraPart(eye.model, "simulated").placed(eye.mount) if config.pictures else None
+    return RobotConfig(
+        BaseConfig(
+            port=str(base),
+            left_radius=model.wheel_radius * float(wrong[0]),
+            right_radius=model.wheel_radius * float(wrong[1]),
+            wheel_base=model.wheel_base * float(wrong[2]),
+            ticks_per_turn=model.ticks_per_turn,
+        ),
+        LidarPart(port=str(lidar), x=YDLIDAR_X4.mount_x, height=YDLIDAR_X4.mount_height),
+        camera,
+    )
+
+
+@contextmanager
+def _camera(room: Room, config: LoopConfig) -> Iterator[SimulatedCamera]:
+    camera = SimulatedCamera(room, CameraModel(rate=config.pictures), config.seed)
+    try:
+        yield camera
+    finally:
+        camera.end()
+
+
+def _drive(
+    config: LoopConfig,
+    settings: Config,
+    parts: RobotConfig,
+    opened: Openers,
+    world: RunningWorld,
+    recording: Path | None,
+    progress: Callable[[float], None],
+    stopped: Callable[[], bool],
+    stack: ExitStack,
+) -> LoopResult:
+    pictures: list[Picture] = []
+
+    def watch(event: Event) -> None:
+        if isinstance(event, Picture):
+            pictures.append(event)
+
+    live_map = LiveMap(settings, LIVE, lidar_mount=parts.lidar.mount, initial_pose=np.array(world.start))
+    stack.callback(live_map.close)
+    pilot = Pilot(
+        sample_route(ROOMS[config.room].route), closed=True, config=PilotConfig(speed=config.speed, blind_time=4.0)
+    )
+    writer = None
+    if recording is not None:
+        camera = parts.camera
+        seen = None if camera is None else (camera.model, camera.T_base_camera)
+        writer = stack.enter_context(RecordingWriter(recording, lidar_mount=parts.lidar.mount, camera=seen))
+    robot = stack.enter_context(Robot(opened))
+    journey = Journey(robot, live_map, writer, watch=watch)
+    for event in robot.wait_until_ready(stopped):
+        journey.take(event)
+    fault = _FaultAtItsTime(config, world)
+    begun, busy = time.monotonic(), time.process_time()
+
+    def steer(sight: Sight, dt: float) -> Twist:
+        gone = time.monotonic() - begun
+        fault.at(gone)
+        progress(min(gone / config.seconds, 1.0))
+        return (0.0, 0.0) if gone < STANDS else pilot.steer(sight.pose, dt, blind=sight.blind, sigma=sight.sigma)
+
+    journey.go(steer, lambda: stopped() or time.monotonic() - begun > config.seconds)
+    busy = (time.process_time() - busy) / (time.monotonic() - begun)
+    counters = _counters(robot, journey)
+    robot.close()
+    live_map.close()
+    record = world.finish()
+    run = live_map.result()
+    run = replace(run, truth=interpolate(record.stamps, record.poses, run.stamps))
+    every = max(len(pictures) // KEPT, 1)
+    return LoopResult(
+        config, settings, run, record, counters, live_map.latencies, busy, pilot.travelled, tuple(journey.troubles),
+        tuple(pictures[every // 2 :: every][:KEPT]), len(pictures),
+    )  # fmt: skip
+
+
+class _FaultAtItsTime:
+    """Does to the world what the configuration wants, once."""
+
+    def __init__(self, config: LoopConfig, world: RunningWorld) -> None:
+        self._fault, self._world, self._done = config.fault, world, config.fault == "none"
+        self._when = STANDS if config.fault == "damaged" else 0.5 * config.seconds
+
+    def at(self, gone: float) -> None:
+        if self._done or gone < self._when:
+            return
+        self._done = True
+        if self._fault == "damaged":
+            self._world.damage(DAMAGE)
+        else:
+            self._world.unplug_lidar(UNPLUGGED)
+
+
+def _counters(robot: Robot, journey: Journey) -> Counters:
+    lidar, base = robot.lidar, robot.base
+    assert isinstance(lidar, YdlidarX4) and isinstance(base, MegaBase)
+    parser = lidar.turns.parser
+    return Counters(
+        parser.good, parser.bad, lidar.reconnections, journey.states, base.refused, base.watchdog_stops, base.resets
+    )
+
+
+def _rmse(poses: Floats, truth: Floats | None) -> dict[str, float]:
+    assert truth is not None
+    return asdict(rmse(poses, truth))
