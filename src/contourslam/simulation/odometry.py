@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.motion import unicycle_step
+from contourslam.geometry.poses import between
 from contourslam.simulation.chance import ODOMETRY, stream
 from contourslam.simulation.config import RobotModel
 from contourslam.simulation.drive import STEPS_PER_TICK, TICK, Drive
@@ -37,7 +38,9 @@ class WheelOdometry:
     base_error: float
 
 
-def read_odometry(drive: Drive, robot: RobotModel, seed: int) -> WheelOdometry:
+def read_odometry(
+    drive: Drive, robot: RobotModel, seed: int, *, errors: tuple[float, float] | None = None
+) -> WheelOdometry:
     """Integrate the encoders through the paper's motion model (eq. 28).
 
     Parameters
@@ -46,6 +49,8 @@ def read_odometry(drive: Drive, robot: RobotModel, seed: int) -> WheelOdometry:
     robot : RobotModel
         As it is; what it believes of its wheel radius and wheel base is wrong by 0.5 to 1.5 %, drawn by seed.
     seed : int
+    errors : tuple of (float, float), optional
+        By how much radius and base are wrong instead, as fractions.
 
     Returns
     -------
@@ -53,6 +58,8 @@ def read_odometry(drive: Drive, robot: RobotModel, seed: int) -> WheelOdometry:
     """
     chance = stream(seed, ODOMETRY)
     radius_error, base_error = chance.choice([-1.0, 1.0], 2) * chance.uniform(0.005, 0.015, 2)
+    if errors is not None:
+        radius_error, base_error = errors
     radius, base = robot.wheel_radius * (1 + radius_error), robot.wheel_base * (1 + base_error)
 
     turns = drive.wheel_angles[::STEPS_PER_TICK] / (2 * math.pi)
@@ -63,3 +70,28 @@ def read_odometry(drive: Drive, robot: RobotModel, seed: int) -> WheelOdometry:
         poses.append(unicycle_step(poses[-1], (left + right) / 2 / TICK, (right - left) / base / TICK, TICK))
     stamps = np.round(drive.times[::STEPS_PER_TICK], 9)
     return WheelOdometry(stamps, np.array(poses), ticks, float(radius_error), float(base_error))
+
+
+def effective_wheels(drive: Drive) -> tuple[float, float, float]:
+    """Radii and wheel base at which the robot really rolled: tyres creep, so that they are not those of its drawing.
+
+    The mean radius is that which makes the angle of the wheels the true way; the wheel base, and how the radii differ,
+    those that make it the true turn (linear least squares over the whole drive, every tick by itself).
+
+    Parameters
+    ----------
+    drive : Drive
+
+    Returns
+    -------
+    left_radius, right_radius, wheel_base : float
+        m.
+    """
+    poses, turned = drive.poses[::STEPS_PER_TICK], np.diff(drive.wheel_angles[::STEPS_PER_TICK], axis=0)
+    steps = between(poses[:-1], poses[1:])
+    way = steps[:, 0] * np.cos(0.5 * steps[:, 2]) + steps[:, 1] * np.sin(0.5 * steps[:, 2])
+    mean = turned.mean(axis=1)
+    radius = float(way @ mean / (mean @ mean))
+    left, right = np.linalg.lstsq(turned, steps[:, 2], rcond=None)[0].tolist()  # -left / base, right / base
+    base = 2.0 * radius / (right - left)
+    return -left * base, right * base, base

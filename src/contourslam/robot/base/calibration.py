@@ -26,6 +26,7 @@ _FEWEST = 12  # pieces of way
 _STEPS = 30
 _CLOSE = 1e-9
 _OUTLYING = 2.5  # standard deviations, from which on a piece counts for less (Cauchy)
+_BELIEVED = 0.1  # fraction to which radii and base are known before; what a drive does not tell stays as it was
 _LAG_SIGMA = 0.05  # s; how far wheels' and lidar's stamps are taken to be off
 _TURNS_WANTED = 0.5 * math.pi  # rad to each side
 _SIGMA_WANTED = 0.002
@@ -123,10 +124,10 @@ def calibrate(
     found, covariance, scale = problem.solve(start)
     before, after = problem.errors(start), problem.errors(found)
     wheels = found[:3]
-    if not (wheels > 0.0).all():
+    if not ((wheels > 0.5 * start[:3]) & (wheels < 2.0 * start[:3])).all():
         raise ConfigError(
-            "the wheels do not fit the way at all (a radius or the base would be negative): are left and right, or the "
-            "sign of a wheel, mixed up?"
+            "the wheels do not fit the way at all, a radius or the base would be off by half or more: are left and "
+            "right, or the sign of a wheel, mixed up, or ticks_per_turn wrong?"
         )
     sigmas = np.sqrt(np.diag(covariance))
     left, right, wheel_base = (float(value) for value in wheels)
@@ -234,7 +235,7 @@ class _Problem:
         scale : ndarray, shape (3,)
             That scatter: m, m, rad.
         """
-        prior = np.diag([0.0, 0.0, 0.0, _LAG_SIGMA**-2, *np.diag(_PLACES) ** -2.0])
+        prior = np.diag([*(_BELIEVED * start[:3]) ** -2.0, _LAG_SIGMA**-2, *np.diag(_PLACES) ** -2.0])
         small = np.array([1e-6, 1e-6, 1e-5, 1e-4, 1e-5, 1e-5, 1e-5])
         found = start.copy()
         for _ in range(_STEPS):
