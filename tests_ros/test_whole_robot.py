@@ -31,9 +31,9 @@ from contourslam.simulation.rooms import ROOMS
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "mega"
 NEEDED = ("avr-gcc", "avr-objcopy", "make", "cc")
-# Speeds ahead (m/s) and rates of turn (rad/s), and for how long (s).
-WAY = ((0.25, 0.0, 4.0), (0.0, 0.7, 3.0), (0.2, 0.4, 4.0), (0.0, -0.7, 2.0))
-CLOSE = 0.05  # m, where the machine is busy with other things
+# Speeds ahead (m/s) and rates of turn (rad/s), and until how far (m) or how much (rad) the odometry says it went.
+WAY = ((0.25, 0.0, 1.0), (0.0, 0.7, 2.0), (0.2, 0.4, 0.8), (0.0, -0.7, 1.4))
+CLOSE = 0.03  # m, as the robot in the loop
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +64,23 @@ def driven(
         for part in ("lidar", "base"):
             processes.start(part, namespace="whole", frame_prefix="whole/", robot=folder / "robot.yaml")
         assert observer.comes("pose", 3, seconds=120.0), observer.faults()
-        for v, omega, seconds in WAY:
-            end = time.monotonic() + seconds
-            while time.monotonic() < end:
+        for v, omega, amount in WAY:
+            begun, until = time.monotonic(), time.monotonic() + 60.0
+            while gone(observer, begun, turning=v == 0.0) < amount and time.monotonic() < until:
                 commands.publish(Twist(linear=Vector3(x=v), angular=Vector3(z=omega)))
                 time.sleep(0.05)
-        time.sleep(1.5)  # it stops by itself
+        assert wait_for(lambda: observer.messages("odom")[-1].twist.twist.linear.x == 0.0, 30.0)
+        time.sleep(2.0)  # also a room that is late has then caught up
         record = world.finish()
     yield observer, record
     observer.close()
+
+
+def gone(observer: PartObserver, since: float, turning: bool) -> float:
+    """How far the odometry went since a time, m, or by how much it turned, rad."""
+    poses = np.array([odometry_from(m, ODOMETRY).pose for m in observer.messages("odom", since)]).reshape(-1, 3)
+    steps = np.diff(np.unwrap(poses, axis=0), axis=0) if turning else np.diff(poses, axis=0)
+    return float(abs(steps[:, 2].sum()) if turning else np.hypot(*steps[:, :2].T).sum())
 
 
 def errors(observer: PartObserver, record: Record, topic: str) -> np.ndarray:
@@ -88,15 +96,19 @@ def errors(observer: PartObserver, record: Record, topic: str) -> np.ndarray:
 def test_the_robot_goes_where_it_is_told(driven: tuple[PartObserver, Record]) -> None:
     _, record = driven
     ways = np.hypot(*np.diff(record.poses[:, :2], axis=0).T)
-    assert ways.sum() == pytest.approx(sum(abs(v) * seconds for v, _, seconds in WAY), rel=0.25)
+    assert ways.sum() == pytest.approx(sum(amount for v, _, amount in WAY if v), abs=0.3)
     heading = np.unwrap(record.poses[:, 2])
-    assert heading[-1] - heading[0] == pytest.approx(sum(omega * seconds for _, omega, seconds in WAY), rel=0.3)
+    turned = sum(np.sign(omega) * (omega / v * amount if v else amount) for v, omega, amount in WAY)
+    assert heading[-1] - heading[0] == pytest.approx(turned, abs=0.6)
 
 
-def test_slam_knows_where_it_is(driven: tuple[PartObserver, Record]) -> None:
+def test_slam_knows_where_it_came_to_rest(driven: tuple[PartObserver, Record]) -> None:
     observer, record = driven
     assert len(observer.messages("pose")) > 60
-    assert np.sqrt((errors(observer, record, "pose") ** 2).mean()) < CLOSE, observer.faults()
+    off = errors(observer, record, "pose")
+    assert off[-1] < CLOSE, observer.faults()
+    if record.latest < 0.05:  # else the truth is that of another time: the machine held up the room
+        assert np.sqrt((off**2).mean()) < CLOSE, observer.faults()
 
 
 def test_its_odometry_drifts_little(driven: tuple[PartObserver, Record]) -> None:
