@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from contourslam.config import Config, LiveConfig, SlamConfig
 from contourslam.errors import ConfigError
 from contourslam.evaluation.errors import rmse
-from contourslam.experiments.known_room import told
 from contourslam.geometry.poses import interpolate
 from contourslam.live.warming import warm_up
 from contourslam.recordings.picture import Picture
@@ -25,7 +24,7 @@ from contourslam.robot.bring_up import Event, Openers, Robot, Trouble, openers
 from contourslam.robot.config import BaseConfig, CameraPart, LidarPart, RobotConfig
 from contourslam.robot.journey import Journey, Sight, Twist
 from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
-from contourslam.robot.live_map import LiveMap
+from contourslam.robot.live_map import LiveMap, settings_of
 from contourslam.robot.pilot import Pilot, PilotConfig
 from contourslam.robot.route import sample_route
 from contourslam.simulation.config import YDLIDAR_X4, CameraModel, RobotModel
@@ -213,7 +212,7 @@ def robot_in_the_loop(
         If the firmware is not built, an extra is missing, or a part does not come up.
     """
     room = ROOMS[config.room]
-    settings = told(config.settings, YDLIDAR_X4)
+    settings = settings_of(robot_config(config, Path(), Path()), config.settings)
     warm_up(settings)  # nothing may be compiled while scans wait
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="contourslam-")))
@@ -256,6 +255,7 @@ def robot_config(config: LoopConfig, lidar: Path, base: Path) -> RobotConfig:
 def _camera(room: Room, config: LoopConfig) -> Iterator[SimulatedCamera]:
     camera = SimulatedCamera(room, CameraModel(rate=config.pictures), config.seed)
     try:
+        camera.wait_until_ready()
         yield camera
     finally:
         camera.end()

@@ -3,21 +3,52 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.config import Config, LiveConfig
+from contourslam.config import Config, LiveConfig, MotionConfig
 from contourslam.geometry.poses import between, compose
 from contourslam.live.processed import Processed
 from contourslam.live.session import Session
 from contourslam.live.start import mapping
 from contourslam.live.worker import Worker
+from contourslam.robot.config import RobotConfig
+from contourslam.robot.lidar.x4_turns import RANGE_MAX
 from contourslam.scan import LaserScan, Odometry
 from contourslam.slam.result import OdometryReadings, RunResult
 
 Floats = NDArray[np.float64]
+_TURN_PER_M_DEG, _TURN_PER_RAD_DEG = 0.3, 0.6  # of a gyroscope whose bias was found at rest, and its scale
+_LEAST_LATERAL = 0.003  # m after one metre
+_CLOCK = 0.003  # s by which the stamps of lidar and base may differ
+
+
+def settings_of(robot: RobotConfig, config: Config) -> Config:
+    """Tell the mapping what is known of the robot: the lidar's place and range, and how good its wheels are.
+
+    An odometry noise that the configuration sets itself stays.
+
+    Parameters
+    ----------
+    robot : RobotConfig
+    config : Config
+    """
+    x, y, yaw = robot.lidar.mount
+    lidar = replace(config.lidar, mount_x=x, mount_y=y, mount_yaw=yaw, max_range=min(config.lidar.max_range, RANGE_MAX))
+    if config.slam.motion != MotionConfig():
+        return replace(config, lidar=lidar)
+    base = robot.base
+    motion = MotionConfig(
+        forward_per_sqrt_m=base.wheel_sigma,
+        lateral_per_sqrt_m=max(base.lateral_sigma, _LEAST_LATERAL),
+        turn_per_sqrt_m_deg=_TURN_PER_M_DEG if base.use_gyro else MotionConfig().turn_per_sqrt_m_deg,
+        turn_per_sqrt_rad_deg=_TURN_PER_RAD_DEG if base.use_gyro else MotionConfig().turn_per_sqrt_rad_deg,
+        clock_sigma=_CLOCK,
+    )
+    return replace(config, lidar=lidar, slam=replace(config.slam, motion=motion))
 
 
 class LiveMap:

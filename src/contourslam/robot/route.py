@@ -2,9 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from contourslam.errors import ConfigError
 
 Floats = NDArray[np.float64]
 SPACING = 0.01
@@ -49,3 +54,87 @@ def wanted_twist(
 def gently(now: float, wanted: float, most: float) -> float:
     """Go from one value towards another, by no more than `most`."""
     return now + min(max(wanted - now, -most), most)
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A way to drive, as a file has it.
+
+    Attributes
+    ----------
+    waypoints : tuple of (float, float)
+        In the frame of the map, which begins where the robot starts, x ahead; m.
+    closed : bool
+        Drive it lap after lap.
+
+    Raises
+    ------
+    ConfigError
+        If there are fewer than two waypoints, or a number is not finite.
+    """
+
+    waypoints: tuple[tuple[float, float], ...]
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.waypoints) < 2:
+            raise ConfigError(f"a route needs at least two waypoints, got {len(self.waypoints)}")
+        if not all(math.isfinite(value) for point in self.waypoints for value in point):
+            raise ConfigError("a route has a waypoint that is not finite")
+        if all(point == self.waypoints[0] for point in self.waypoints):
+            raise ConfigError("all waypoints of the route are the same")
+
+
+def load_route(path: Path) -> Route:
+    """Read a route: YAML with ``waypoints`` (x and y of each, m) and perhaps ``closed: true``, or CSV with x and y.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing or holds no route; the message says where.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    try:
+        return _from_csv(text) if path.suffix.lower() == ".csv" else _from_yaml(text)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
+def _from_csv(text: str) -> Route:
+    points = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = [word.strip() for word in line.split("#")[0].split(",")]
+        if words == [""] or (number == 1 and words[:2] == ["x", "y"]):
+            continue
+        points.append(_point(words, f"line {number}"))
+    return Route(tuple(points))
+
+
+def _from_yaml(text: str) -> Route:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        content: Any = YAML(typ="safe", pure=True).load(text)
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"is not valid YAML ({' '.join(str(error).split())})") from error
+    if not isinstance(content, dict) or not isinstance(content.get("waypoints"), list):
+        raise ConfigError("holds no list of waypoints; write `waypoints: [[0, 0], [2, 0], [2, 1.5]]`")
+    unknown = sorted(str(name) for name in content.keys() - {"waypoints", "closed"})
+    if unknown or not isinstance(content.get("closed", False), bool):
+        raise ConfigError(
+            f"{', '.join(unknown) or 'closed'} is not known; there are waypoints and closed: true or false"
+        )
+    points = [_point(entry, f"waypoint {number}") for number, entry in enumerate(content["waypoints"], 1)]
+    return Route(tuple(points), content.get("closed", False))
+
+
+def _point(entry: Any, place: str) -> tuple[float, float]:
+    try:
+        x, y = (float(value) for value in entry)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"{place} must be two numbers, x and y in m, got {entry!r}") from error
+    return x, y

@@ -14,6 +14,9 @@ from contourslam.simulation.config import CameraModel
 from contourslam.simulation.room import Room
 
 
+_READY = 180.0  # s; painting the walls takes some of them
+
+
 class SimulatedCamera(PictureSource):
     """A source of pictures drawn where the world says that the robot is.
 
@@ -42,18 +45,35 @@ class SimulatedCamera(PictureSource):
         theirs.close()
         sent.close()
 
+    def wait_until_ready(self) -> None:
+        """Wait until walls are painted and graphics are open.
+
+        Raises
+        ------
+        DeviceError
+            If they cannot be.
+        """
+        if not self._pictures.poll(_READY):
+            raise DeviceError(f"{self.name}: nothing was drawn within {_READY:.0f} s; is the machine very busy?")
+        self._next()
+
     def frames(self, stopped: Callable[[], bool] = never) -> Iterator[Picture]:
         """See :meth:`PictureSource.frames`."""
         while not stopped():
-            try:
-                if not self._pictures.poll(0.1):
-                    continue
-                picture = self._pictures.recv()
-            except (EOFError, OSError):
-                raise DeviceUnpluggedError(f"{self.name}: its process has ended") from None
-            if isinstance(picture, str):
-                raise DeviceError(f"{self.name}: {picture}")
-            yield picture
+            if self._pictures.poll(0.1):
+                picture = self._next()
+                if picture is not None:
+                    yield picture
+
+    def _next(self) -> Picture | None:
+        """What the process says next: a picture, or None once it is ready."""
+        try:
+            said: Picture | str | None = self._pictures.recv()
+        except (EOFError, OSError):
+            raise DeviceUnpluggedError(f"{self.name}: its process has ended") from None
+        if isinstance(said, str):
+            raise DeviceError(f"{self.name}: {said}")
+        return said
 
     def end(self) -> None:
         """End the process; the source is of no use afterwards."""
@@ -71,6 +91,8 @@ def _draw(room: Room, camera: CameraModel, seed: int, poses: Connection, picture
     with contextlib.suppress(EOFError, OSError):
         try:
             with FisheyeCamera(room, camera, seed=seed) as eye:
+                eye.open()
+                pictures.send(None)
                 while True:
                     stamp, pose = poses.recv()
                     while poses.poll():

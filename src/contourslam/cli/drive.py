@@ -1,0 +1,204 @@
+"""``contourslam drive``: the whole robot, mapping while it drives, without ROS."""
+
+import math
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contourslam.cli.console import make_way, note, prepare_folder, print_json
+from contourslam.cli.interrupt import INTERRUPTED, Interrupt
+from contourslam.cli.options import Flag, Json, Output, Overwrite, Patience, Settings
+from contourslam.cli.run import DEFAULTS
+from contourslam.config import Config, LiveConfig
+from contourslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from contourslam.robot.bring_up import Event, Robot
+    from contourslam.robot.journey import Journey, Sight, Steer
+    from contourslam.robot.live_map import LiveMap
+    from contourslam.slam.result import RunResult
+
+_REDRAW = 0.25  # s
+_STANDS = 2.0  # s at first, in which the gyroscope's bias is found and the map begins
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Drive the robot, map live and record: a YDLidar X4, the Mega's base, and a camera where robot.yaml has one.
+
+    The robot follows a route, or the keys: arrows or w a s d drive, q and e in a curve, space stops, x ends. It stops
+    0.7 s after the last key. With neither it only maps, while somebody pushes it. It stands still for the first two
+    seconds. A route is YAML (waypoints: [[0, 0], [2, 0]], closed: true) or CSV (x, y), in m, from where the robot
+    starts, x ahead; it is followed by the pose in the map, and the robot stops where its lidar falls silent.
+
+    The folder gets what `contourslam run` writes, and the recording. The motors are off whenever the command ends.
+
+    Example: contourslam drive -o out/room --robot robot.yaml --keys
+    """
+
+    output: Output
+    overwrite: Overwrite = False
+    robot: Path | None = None
+    """How the robot is built: a robot.yaml; the defaults where left out, ports found by themselves."""
+    route: Path | None = None
+    """Waypoints to drive along, YAML or CSV."""
+    keys: Flag = False
+    """Drive by the keys of this terminal."""
+    speed: float = 0.25
+    """m/s."""
+    turn_rate_deg: float = 45.0
+    """No faster turn, degrees/s."""
+    seconds: float | None = None
+    """How long, s; until Ctrl-C, x or the end of the route where left out."""
+    picture_rate: float = 2.0
+    """Pictures a second, where there is a camera."""
+    patience: Patience = 30.0
+    json: Json = False
+    settings: Settings = field(default_factory=lambda: DEFAULTS)
+
+    def execute(self, command: str) -> int:
+        """Drive, map, record, and say how it went."""
+        from contourslam.live.warming import warm_up
+        from contourslam.recordings import RecordingWriter
+        from contourslam.robot.bring_up import Robot, openers
+        from contourslam.robot.config import RobotConfig, load_robot
+        from contourslam.robot.journey import Journey
+        from contourslam.robot.live_map import LiveMap, settings_of
+
+        self._check()
+        config = RobotConfig() if self.robot is None else load_robot(self.robot)
+        settings = settings_of(config, self.settings)
+        with ExitStack() as stack:
+            steer, ended = self._steering(stack)
+            prepare_folder(self.output, overwrite=self.overwrite)
+            make_way(self.output / "recording", overwrite=self.overwrite)
+            note("making ready; the robot must stand still until it drives")
+            warm_up(settings)
+            interrupt = stack.enter_context(Interrupt())
+            robot = stack.enter_context(Robot(openers(config, patience=self.patience, rate=self.picture_rate)))
+            events = robot.wait_until_ready(interrupt.or_after(None))
+            live = LiveConfig(wait=0.6, max_waiting=10)
+            autosave = self.output / "map.cmap"
+            live_map = LiveMap(settings, live, lidar_mount=config.lidar.mount, autosave=autosave)
+            stack.callback(live_map.close)
+            camera = None if config.camera is None else (config.camera.model, config.camera.T_base_camera)
+            writer = stack.enter_context(
+                RecordingWriter(self.output / "recording", lidar_mount=config.lidar.mount, camera=camera)
+            )
+            status = _Status(robot, live_map)
+            journey = Journey(robot, live_map, writer, watch=status.show)
+            for event in events:
+                journey.take(event)
+            until = interrupt.or_after(self.seconds)
+            journey.go(steer, lambda: until() or ended())
+            robot.close()
+            status.clear()
+            live_map.close()
+        if not journey.scans:
+            note("no turn of the lidar was completed; there is no map")
+            return INTERRUPTED if interrupt.requested else 1
+        return self._write(live_map, journey, settings, command)
+
+    def _check(self) -> None:
+        if self.route is not None and self.keys:
+            raise ConfigError("--route and --keys do not go together; choose one")
+        if self.seconds is not None and not self.seconds > 0.0:
+            raise ConfigError(f"--seconds must be above 0, got {self.seconds}")
+        for name in ("speed", "turn_rate_deg", "picture_rate"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"--{name.replace('_', '-')} must be above 0, got {getattr(self, name)}")
+
+    def _steering(self, stack: ExitStack) -> "tuple[Steer, Any]":
+        """Give what decides on the twist, and what says that it is over."""
+        turn_rate = math.radians(self.turn_rate_deg)
+        if self.keys:
+            from contourslam.robot.keys import HELP, Keyboard, KeyDriver
+
+            keyboard, driver = stack.enter_context(Keyboard()), KeyDriver(self.speed, turn_rate)
+            note(HELP)
+
+            def by_keys(sight: "Sight", dt: float) -> tuple[float, float]:
+                driver.press(keyboard.pressed())
+                return driver.twist()
+
+            return by_keys, lambda: driver.ended
+        if self.route is None:
+            return lambda sight, dt: (0.0, 0.0), lambda: False
+        from contourslam.robot.pilot import Pilot, PilotConfig
+        from contourslam.robot.route import load_route, sample_route
+
+        route = load_route(self.route)
+        habits = PilotConfig(speed=self.speed, turn_limit=turn_rate)
+        pilot = Pilot(sample_route(route.waypoints, closed=route.closed), closed=route.closed, config=habits)
+        begun: list[float] = []
+
+        def along(sight: "Sight", dt: float) -> tuple[float, float]:
+            begun.append(time.monotonic()) if not begun else None
+            if time.monotonic() - begun[0] < _STANDS:
+                return 0.0, 0.0
+            return pilot.steer(sight.pose, dt, blind=sight.blind, sigma=sight.sigma)
+
+        return along, lambda: pilot.arrived
+
+    def _write(self, live_map: "LiveMap", journey: "Journey", settings: Config, command: str) -> int:
+        from contourslam.evaluation.metrics import run_metrics
+        from contourslam.report.result_folder import write_result_folder
+        from contourslam.report.run_page import write_run_page
+
+        skipped: dict[str, int] = {}
+        for trouble in journey.troubles:
+            if trouble.message:
+                skipped[f"{trouble.part}: {trouble.message}"] = skipped.get(f"{trouble.part}: {trouble.message}", 0) + 1
+        result: RunResult = replace(live_map.result(), skipped=skipped)
+        metrics = run_metrics(result)
+        write_result_folder(self.output, result, settings, metrics, command=command)
+        write_run_page(self.output, result, settings, metrics, command=command, name=self.output.resolve().name)
+        live_map.session.save(self.output / "map.cmap")
+        if self.json:
+            print_json(metrics)
+        else:
+            size = metrics["landmarks"]
+            print(
+                f"{self.output}: {journey.scans} scans, {journey.pictures} pictures, {size['corners']} corners, "
+                f"{size['walls']} walls, {metrics['loops']} loops; the recording is in {self.output / 'recording'}"
+            )
+        return 0
+
+
+class _Status:
+    """A line on a terminal about the robot; elsewhere only what goes wrong is said."""
+
+    def __init__(self, robot: "Robot", live_map: "LiveMap") -> None:
+        self._robot, self._map = robot, live_map
+        self._live, self._drawn, self._begun = sys.stderr.isatty(), 0.0, time.monotonic()
+
+    def show(self, event: "Event") -> None:
+        """Say what is new."""
+        from contourslam.robot.bring_up import Trouble
+
+        if isinstance(event, Trouble):
+            self.clear()
+            note(event.message or f"the {event.part} is there again")
+        elif self._live and time.monotonic() - self._drawn > _REDRAW:
+            self._drawn = time.monotonic()
+            print(f"\r{self._line()}\x1b[K", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._live:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+    def _line(self) -> str:
+        pose, last, state = self._map.pose(), self._map.last, self._robot.state
+        parts = [f"{time.monotonic() - self._begun:5.0f} s"]
+        if pose is not None and last is not None:
+            sigma = 100.0 * math.sqrt(max(float(last.covariance[0, 0] + last.covariance[1, 1]), 0.0))
+            parts.append(f"x {pose[0]:6.2f} m  y {pose[1]:6.2f} m  {math.degrees(pose[2]):4.0f}°  ±{sigma:.1f} cm")
+        if state is not None and state.battery is not None:
+            parts.append(f"{state.battery:.1f} V{' LOW' if state.battery_low else ''}")
+        if state is not None and state.watchdog:
+            parts.append("stopped by its watchdog")
+        return "  ".join([*parts, *(f"no {name}" for name in self._robot.troubles)])
