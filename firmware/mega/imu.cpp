@@ -43,17 +43,19 @@ const Step START[] = {
 };
 constexpr uint8_t STEPS = sizeof START / sizeof START[0];
 constexpr uint8_t FIRST_OF_COMPASS = 9;
+constexpr uint8_t FIRST_SETTING = 3, SETTINGS = 4;  // in registers side by side
 constexpr uint8_t READ_AGAIN = 200;     // periods until it is looked for again: 1 s
 constexpr uint8_t COMPASS_EVERY = 4;    // periods
+constexpr uint8_t CHECK_EVERY = 20;     // periods
 constexpr uint8_t FAILURES = 3;         // in a row, and it is gone
 constexpr uint8_t STALE = 25;           // readings of the compass without news: 0.5 s
 
 enum class At : uint8_t { STARTING, RUNNING };
-enum class Asked : uint8_t { NOTHING, STEP, MOTION, FIELD };
+enum class Asked : uint8_t { NOTHING, STEP, MOTION, FIELD, CHECK };
 
 At at;
 Asked asked;
-uint8_t step, wait, late, failures, compass_failures, compass_due;
+uint8_t step, wait, late, failures, compass_failures, compass_due, check_due;
 Kind found;
 bool compass_runs;
 
@@ -77,6 +79,11 @@ void turn(const float *sensor, int16_t *base) {
   base[2] = fit(axis(sensor, IMU_UP));
 }
 
+void ask(Asked what) {
+  asked = what;
+  late = 0;
+}
+
 void look_again(uint8_t periods) {
   at = At::STARTING;
   asked = Asked::NOTHING;
@@ -94,6 +101,7 @@ void run() {
   at = At::RUNNING;
   found = compass_runs ? WITH_COMPASS : WITHOUT_COMPASS;
   failures = compass_failures = compass_due = 0;
+  check_due = CHECK_EVERY;
 }
 
 // What a step of the start has brought; whether to go on.
@@ -132,6 +140,13 @@ void moved(bool done) {
   sum_count++;
 }
 
+// A part whose plug had a bad moment answers as before, but has forgotten its settings.
+void checked(bool done) {
+  const uint8_t *data = twi::data();
+  for (uint8_t i = 0; i < SETTINGS; i++)
+    if (!done || data[i] != START[FIRST_SETTING + i].value) return look_again(0);
+}
+
 void compass_read(bool done) {
   const uint8_t *data = twi::data();
   if (done && (data[0] & AK_READY) && !(data[7] & AK_OVERFLOW)) {
@@ -148,21 +163,21 @@ void compass_read(bool done) {
 
 void tick() {
   if (compass_due) compass_due--;
+  if (check_due) check_due--;
   if (asked != Asked::NOTHING) {
     // Two periods are twenty times what a transfer needs.
     if (++late == 2) twi::give_up();
     return;
   }
-  late = 0;
   if (wait) {
     wait--;
   } else if (at == At::STARTING) {
     const Step &next = START[step];
-    asked = Asked::STEP;
+    ask(Asked::STEP);
     if (next.reads) twi::read(next.address, next.reg, next.value);
     else twi::write(next.address, next.reg, next.value);
   } else {
-    asked = Asked::MOTION;
+    ask(Asked::MOTION);
     twi::read(MPU, ACCEL_XOUT_H, 14);
   }
 }
@@ -177,9 +192,15 @@ void poll() {
   if (was == Asked::STEP) stepped(done);
   if (was == Asked::MOTION) moved(done);
   if (was == Asked::FIELD) compass_read(done);
-  if (was == Asked::MOTION && at == At::RUNNING && compass_runs && !compass_due) {
+  if (was == Asked::CHECK) checked(done);
+  if (was != Asked::MOTION || !done) return;
+  if (!check_due) {
+    check_due = CHECK_EVERY;
+    ask(Asked::CHECK);
+    twi::read(MPU, START[FIRST_SETTING].reg, SETTINGS);
+  } else if (compass_runs && !compass_due) {
     compass_due = COMPASS_EVERY;
-    asked = Asked::FIELD;
+    ask(Asked::FIELD);
     twi::read(AK, AK_ST1, 8);
   }
 }

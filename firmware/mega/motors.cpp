@@ -83,9 +83,7 @@ void set(Side side, float duty) {
     steps = constrain(lroundf(wanted), -(int16_t)TOP, (int16_t)TOP);
     carry[side] = constrain(wanted - steps, -1.0f, 1.0f);
   }
-  int8_t to = steps > 0 ? 1 : steps < 0 ? -1 : 0;
-  if (to != direction[side]) compare(motor.pwm) = 0;  // never a full push while the direction pins change
-  point(side, to);
+  point(side, steps > 0 ? 1 : steps < 0 ? -1 : 0);
   compare(motor.pwm) = abs(steps);
 }
 

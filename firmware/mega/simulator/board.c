@@ -74,7 +74,8 @@ static uint32_t to_head, to_tail, from_count;
 
 static avr_cycle_count_t asleep, in_interrupts, interrupt_start, longest_interrupt;
 static unsigned resets;
-static double hang_at = -1, unplug_at = -1, plug_at = -1;
+static double hang_at = -1, unplug_at = -1, plug_at = -1, stick_at = -1, free_at = -1, poke_at = -1;
+static uint32_t poke_address, poke_value;
 static uint16_t hung_word;
 static avr_flashaddr_t hung_at;
 static void (*core_reset)(struct avr_t *avr);
@@ -255,6 +256,17 @@ static void hang(void) {
 	memcpy(avr->flash + hung_at, "\xFF\xCF", 2);
 }
 
+/* What only happens at a time: faults, and memory (u32) that is changed to be near a wrap. */
+static void happen(void) {
+	double now = avr->cycle / (MHZ * 1e6);
+	if (unplug_at >= 0 && now >= unplug_at) inertial_plug(&inertial, false), unplug_at = -1;
+	if (plug_at >= 0 && now >= plug_at) inertial_plug(&inertial, true), plug_at = -1;
+	if (stick_at >= 0 && now >= stick_at) inertial.stuck = true, stick_at = -1;
+	if (free_at >= 0 && now >= free_at) inertial.stuck = false, free_at = -1;
+	if (poke_at >= 0 && now >= poke_at && !avr->interrupts.running_ptr)
+		memcpy(avr->data + poke_address, &poke_value, 4), poke_at = -1;
+}
+
 static void run(const request_t *request) {
 	step_start = avr->cycle;
 	static avr_cycle_count_t due;
@@ -262,9 +274,7 @@ static void run(const request_t *request) {
 	step_cycles = due > step_start ? due - step_start : 1;
 	for (int side = 0; side < 2; side++) start_edges(&encoders[side], request->position[side]);
 	avr_cycle_timer_register(avr, step_cycles, on_end, NULL);
-	double now = avr->cycle / (MHZ * 1e6);
-	if (unplug_at >= 0 && now >= unplug_at) inertial_plug(&inertial, false), unplug_at = -1;
-	if (plug_at >= 0 && now >= plug_at) inertial_plug(&inertial, true), plug_at = -1;
+	happen();
 	pace();
 	while (avr->cycle < due) {
 		int state = avr_run(avr);
@@ -312,8 +322,9 @@ static void begin(const char *path) {
 }
 
 static void take_options(int count, char **words) {
-	static const struct option OPTIONS[] = {{"imu", 1, 0, 'i'},	   {"imu-axes", 1, 0, 'a'}, {"unplug-at", 1, 0, 'u'},
-											{"plug-at", 1, 0, 'p'}, {"hang-at", 1, 0, 'h'},	 {0, 0, 0, 0}};
+	static const struct option OPTIONS[] = {
+		{"imu", 1, 0, 'i'},		{"imu-axes", 1, 0, 'a'}, {"unplug-at", 1, 0, 'u'}, {"plug-at", 1, 0, 'p'},
+		{"stick-at", 1, 0, 's'}, {"free-at", 1, 0, 'f'}, {"hang-at", 1, 0, 'h'}, {"poke", 1, 0, 'k'}, {0, 0, 0, 0}};
 	for (int option; (option = getopt_long(count, words, "", OPTIONS, NULL)) >= 0;) {
 		int axes[3];
 		switch (option) {
@@ -327,12 +338,20 @@ static void take_options(int count, char **words) {
 				break;
 			case 'u': unplug_at = atof(optarg); break;
 			case 'p': plug_at = atof(optarg); break;
+			case 's': stick_at = atof(optarg); break;
+			case 'f': free_at = atof(optarg); break;
 			case 'h': hang_at = atof(optarg); break;
+			case 'k':
+				if (sscanf(optarg, "%lf,%" SCNu32 ",%" SCNu32, &poke_at, &poke_address, &poke_value) != 3 ||
+					poke_address > 0x21FC)
+					fail("--poke wants SECONDS,ADDRESS,VALUE");
+				break;
 			default: exit(2);
 		}
 	}
 	if (optind != count - 1)
-		fail("usage: board [--imu mpu9250|mpu6500|none] [--imu-axes 1,2,3] [--unplug-at S] [--plug-at S] [--hang-at S] FIRMWARE");
+		fail("usage: board [--imu mpu9250|mpu6500|none] [--imu-axes 1,2,3] [--unplug-at S] [--plug-at S] [--stick-at S] "
+			 "[--free-at S] [--hang-at S] [--poke S,ADDRESS,VALUE] FIRMWARE");
 }
 
 int main(int count, char **words) {

@@ -7,7 +7,7 @@
 #include "avr_twi.h"
 
 enum {
-	TWSR = 0xB9, /* the chip's */
+	TWSR = 0xB9, TWCR = 0xBC, TWIE = 1, /* the chip's */
 	MOTION = 0x68, COMPASS = 0x0C,
 	GYRO_CONFIG = 0x1B, ACCEL_CONFIG = 0x1C, INT_PIN_CFG = 0x37, ACCEL_XOUT_H = 0x3B, GYRO_XOUT_H = 0x43,
 	PWR_MGMT_1 = 0x6B, WHO_AM_I = 0x75,
@@ -129,11 +129,12 @@ static void on_bus(struct avr_irq_t *irq, uint32_t value, void *param) {
 
 /*
  * simavr 1.6 tells the chip after an address that it has sent data (0x28, 0x30), where the datasheet has 0x18 and 0x20.
- * This is called before the chip is interrupted.
+ * This is called before the chip is interrupted, which it is not while the bus is held.
  */
 static void on_status(struct avr_irq_t *irq, uint32_t status, void *param) {
 	(void)irq;
 	inertial_t *part = param;
+	if (part->stuck) part->avr->data[TWCR] &= ~TWIE;
 	if (part->only_addressed && (status == 0x28 || status == 0x30)) part->avr->data[TWSR] = status - 0x10;
 }
 

@@ -15,6 +15,8 @@ typedef struct {
 	/* Base frame: gyro (1/4096 rad/s), accelerometer (mm/s^2), compass (0.1 uT). */
 	int16_t values[9];
 
+	bool stuck; /* it holds the bus: no transfer ends */
+
 	avr_t *avr;
 	avr_irq_t *to_bus;
 	uint8_t motion[128], compass[32]; /* registers */

@@ -129,3 +129,22 @@ def test_an_imu_that_is_unplugged_is_missed_and_found_again(bench: Callable[...,
     assert mega.state().flags & (IMU | COMPASS) == IMU | COMPASS
     assert np.all(np.abs(nine(mega.state()) - READINGS[0]) <= TOLERANCES)
     assert mega.decoder.lost == 0
+
+
+def test_a_part_that_forgot_its_settings_for_a_loose_plug_is_set_up_anew(bench: Callable[..., Bench]) -> None:
+    mega = bench("--unplug-at", "1.0", "--plug-at", "1.005")  # gone for one reading
+    mega.imu = READINGS[0]
+    mega.run(1.9)
+    assert np.all(np.abs(nine(mega.state()) - READINGS[0]) <= TOLERANCES)
+    assert not all(state.flags & IMU for state in mega.states()[40:])
+
+
+def test_a_bus_that_is_held_is_given_up_and_freed(bench: Callable[..., Bench]) -> None:
+    mega = bench("--stick-at", "1.0", "--free-at", "1.5")
+    mega.run(1.0)
+    assert mega.state().flags & IMU
+    mega.run(0.1)
+    assert not mega.state().flags & IMU
+    mega.run(1.9)
+    assert mega.state().flags & (IMU | COMPASS) == IMU | COMPASS
+    assert mega.decoder.lost == 0
