@@ -11,9 +11,12 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from contourslam.errors import ConfigError
-from contourslam_ros.settings import Settings, declared, parameters_yaml
+from contourslam.robot.config import RobotConfig, load_robot
+from contourslam_ros.part_settings import BaseNodeConfig, CameraConfig, LidarConfig, robot_yaml
+from contourslam_ros.settings import Settings, declare, declared, parameters_yaml
 
-FILE = Path(__file__).parents[1] / "ros2" / "contourslam_ros" / "config" / "parameters.yaml"
+CONFIG = Path(__file__).parents[1] / "ros2" / "contourslam_ros" / "config"
+FILE, ROBOT = CONFIG / "parameters.yaml", CONFIG / "robot.yaml"
 
 
 @pytest.fixture
@@ -39,6 +42,11 @@ def node(ros: None) -> Iterator[Callable[..., Node]]:
 
 def test_the_file_of_parameters_is_as_the_configuration_is_now() -> None:
     assert FILE.read_text() == parameters_yaml(), "python3 -m contourslam_ros.settings > config/parameters.yaml"
+
+
+def test_the_file_of_a_robot_is_as_its_configuration_is_now_and_is_read_as_the_defaults() -> None:
+    assert ROBOT.read_text() == robot_yaml(), "python3 -m contourslam_ros.part_settings > config/robot.yaml"
+    assert load_robot(ROBOT) == RobotConfig()
 
 
 def test_ros_reads_the_file_and_finds_the_defaults(node: Callable[..., Node]) -> None:
@@ -76,3 +84,18 @@ def test_a_parameter_is_not_changed_under_a_running_map(node: Callable[..., Node
     declared(made)
     (result,) = made.set_parameters([Parameter("lidar.max_range", value=5.0)])
     assert not result.successful
+
+
+@pytest.mark.parametrize("config", [LidarConfig(), BaseNodeConfig(), CameraConfig()])
+def test_each_parameter_of_the_parts_says_what_it_means(node: Callable[..., Node], config: Any) -> None:
+    made = node()
+    assert declare(made, config) == config
+    for name in config.__dataclass_fields__:
+        assert made.describe_parameter(name).description
+
+
+def test_a_wrong_value_of_a_part_is_refused_by_name(node: Callable[..., Node]) -> None:
+    with pytest.raises(ConfigError, match="cmd_vel_timeout must be a positive number"):
+        declare(node(cmd_vel_timeout=0), BaseNodeConfig())
+    with pytest.raises(ConfigError, match="port must be a str"):
+        declare(node(port=1), LidarConfig())

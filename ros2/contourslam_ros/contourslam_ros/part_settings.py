@@ -1,11 +1,16 @@
-"""The parameters of the nodes of the robot's parts; how the robot itself is built stands in its robot.yaml."""
+"""The parameters of the nodes of the robot's parts; how the robot itself is built stands in its robot.yaml.
+
+``python3 -m contourslam_ros.part_settings`` writes a robot.yaml of the defaults, with what each value means.
+"""
 
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from contourslam.errors import ConfigError
 from contourslam.robot.config import RobotConfig, load_robot
+from contourslam_ros.settings import yaml_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,3 +93,23 @@ class CameraConfig(SensorConfig):
     def __post_init__(self) -> None:
         if not 0.0 < self.rate < math.inf:
             raise ConfigError(f"parameter rate must be a positive number, got {self.rate!r}")
+
+
+def robot_yaml() -> str:
+    """Give a robot of the defaults as the file that says how it is built, with what each value means."""
+    robot = RobotConfig()
+    lines = [
+        "# How the robot is built, in SI units; what is left out keeps its default.",
+        "# Copy it, and change what differs; docs/robot.md tells how. Calibrations write into it.",
+        "base:",
+        *yaml_lines(robot.base, "  "),
+        "lidar:",
+        *yaml_lines(robot.lidar, "  "),
+        "# Written by `contourslam calibrate camera` and `contourslam calibrate extrinsics`.",
+        "camera: null",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(robot_yaml())

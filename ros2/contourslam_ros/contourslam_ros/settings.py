@@ -153,16 +153,17 @@ def parameters_yaml() -> str:
         "    use_sim_time: false",
     ]
     defaults = Settings()
-    lines += _lines(defaults.node, "    ") + _lines(defaults.core, "    ")
-    lines += ["    live:", *_lines(defaults.live, "      ")]
+    lines += yaml_lines(defaults.node, "    ") + yaml_lines(defaults.core, "    ")
+    lines += ["    live:", *yaml_lines(defaults.live, "      ")]
     return "\n".join(lines) + "\n"
 
 
-def _lines(config: object, indent: str) -> list[str]:
+def yaml_lines(config: object, indent: str) -> list[str]:
+    """Give the fields of a configuration as lines of YAML, each below what it means."""
     lines = []
     for name, value, meaning in _fields(config):
         if dataclasses.is_dataclass(value):
-            lines += [f"{indent}{name}:", *_lines(value, indent + "  ")]
+            lines += [f"{indent}{name}:", *yaml_lines(value, indent + "  ")]
         else:
             lines += [f"{indent}# {meaning}", f"{indent}{name}: {_yaml(value)}"]
     return lines
