@@ -26,10 +26,11 @@ COMMANDS = {
     "locate": "Find a robot in a known map from one scan.",
     "world": "Write a simulated room as a world of Gazebo.",
     "lidar": "Look at a YDLidar X4 on a serial port.",
+    "base": "Look at the base, an Arduino Mega, on a serial port.",
     "record": "Record the scans of a YDLidar X4.",
     "drive": "Drive the whole robot, map live and record.",
     "camera": "Look at a camera, and keep pictures of it.",
-    "calibrate": "Find out how a robot is built: the camera's lens and place.",
+    "calibrate": "Find out how a robot is built: wheels, the camera's lens and place.",
     "warm-up": "Compile everything before the robot drives.",
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""
