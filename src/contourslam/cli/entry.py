@@ -29,6 +29,7 @@ COMMANDS = {
     "base": "Look at the base, an Arduino Mega, on a serial port.",
     "record": "Record the scans of a YDLidar X4.",
     "drive": "Drive the whole robot, map live and record.",
+    "robot-in-the-loop": "Let the whole robot drive at real time against simulated devices.",
     "camera": "Look at a camera, and keep pictures of it.",
     "calibrate": "Find out how a robot is built: wheels, the camera's lens and place.",
     "warm-up": "Compile everything before the robot drives.",

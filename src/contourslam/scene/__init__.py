@@ -1,1 +1,1 @@
-"""The 3-D scene: walls of a map raised to a height and textured from pictures."""
+"""The 3-D scene: surfaces of a map raised from the floor, coloured from the pictures taken along the way, as glTF."""

@@ -1,0 +1,133 @@
+"""The floor under what was seen from along the way."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.kernels import kernel
+from contourslam.scene.surface import Surface
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_RAYS = 720
+_APART = 0.4  # m between the places that the floor is looked at from
+_BEHIND = 0.02  # m by which it goes on below a wall
+_MOST = 40.0  # m along a side of one piece
+
+
+def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tuple[Surface, ...]:
+    """Lay a floor wherever something stands in sight of the way.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        The way of the base.
+    blocks : ndarray, shape (b, 5)
+        As from :func:`contourslam.scene.occlusion.occluders`.
+    reach : float
+        How far the floor is looked at from each place; it is left out where no block ends the sight, m.
+    cell : float
+        Side of the squares that it is made of, m.
+
+    Returns
+    -------
+    tuple of Surface
+        Pieces, "floor-0" and so on; none where there are no poses.
+    """
+    import cv2
+
+    places = _thinned(poses[:, :2])
+    if not len(places):
+        return ()
+    angles = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
+    rings = [_sights(place, angles, blocks, reach) for place in places]
+    low = np.min([ring.min(axis=0) for ring in rings], axis=0)
+    size = np.max([ring.max(axis=0) for ring in rings], axis=0) - low
+    columns, rows = (int(n) for n in np.ceil(size / cell) + 1)
+    seen = np.zeros((rows, columns), np.uint8)
+    for ring in rings:
+        cv2.fillPoly(seen, [np.round((ring - low) / cell * 16 - 8).astype(np.int32)], 1, shift=4)
+    seen = _largest(cv2, np.asarray(cv2.morphologyEx(seen, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8))
+    step = max(int(_MOST / cell), 1)
+    floors: list[Surface] = []
+    for row in range(0, rows, step):
+        for column in range(0, columns, step):
+            part = seen[row : row + step, column : column + step].astype(np.bool_)
+            if part.any():
+                floors.append(_piece(part, low + cell * np.array([column, row]), cell, len(floors)))
+    return tuple(floors)
+
+
+def _piece(part: Bools, corner: Floats, cell: float, number: int) -> Surface:
+    inside_rows, inside_columns = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
+    part = part[inside_rows[0] : inside_rows[-1] + 1, inside_columns[0] : inside_columns[-1] + 1]
+    corner = corner + cell * np.array([inside_columns[0], inside_rows[0]])
+    x, y = np.eye(3)[:2]
+    rows, columns = part.shape
+    origin = np.append(corner, 0.0)
+    return Surface(f"floor-{number}", "floor", origin, x, y, columns * cell, rows * cell, cell * _rectangles(part))
+
+
+def _thinned(places: Floats) -> Floats:
+    """Places of the way that are not close to the one kept before."""
+    kept: list[Floats] = []
+    for place in places:
+        if not kept or np.hypot(*(place - kept[-1])) > _APART:
+            kept.append(place)
+    return np.array(kept).reshape(-1, 2)
+
+
+@kernel
+def _sights(eye: Floats, angles: Floats, blocks: Floats, reach: float) -> Floats:
+    """Where rays in the plane end, shape (n, 2); a ray that meets nothing ends halfway out."""
+    ring = np.empty((angles.size, 2))
+    for n in range(angles.size):
+        dx, dy = math.cos(angles[n]), math.sin(angles[n])
+        best = reach
+        for b in range(blocks.shape[0]):
+            ax, ay = blocks[b, 0] - eye[0], blocks[b, 1] - eye[1]
+            sx, sy = blocks[b, 2] - blocks[b, 0], blocks[b, 3] - blocks[b, 1]
+            across = dx * sy - dy * sx
+            if across == 0.0:
+                continue
+            distance, place = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
+            if 0.0 < distance < best and 0.0 <= place <= 1.0:
+                best = distance
+        length = best + _BEHIND if best < reach else 0.0
+        ring[n, 0], ring[n, 1] = eye[0] + length * dx, eye[1] + length * dy
+    return ring
+
+
+def _largest(cv2: Any, seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Only pieces worth showing: connected and not much smaller than the largest."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(seen, connectivity=4)
+    areas = stats[:, cv2.CC_STAT_AREA]
+    good = np.zeros(count, np.uint8)
+    good[1:] = areas[1:] > 0.02 * areas[1:].max() if count > 1 else 0
+    return np.asarray(good[labels])
+
+
+def _rectangles(part: Bools) -> Floats:
+    """Cover the cells with few rectangles: runs of a row, drawn up as long as the next row has the same run.
+
+    Returns
+    -------
+    ndarray, shape (p, 4)
+        Left, lower, right, upper in cells.
+    """
+    done: list[tuple[int, int, int, int]] = []
+    open_runs: dict[tuple[int, int], int] = {}
+    for row in range(len(part) + 1):
+        line = np.zeros(part.shape[1] + 2, np.int8)
+        if row < len(part):
+            line[1:-1] = part[row]
+        turns = np.flatnonzero(np.diff(line))
+        runs = set(zip(turns[::2].tolist(), turns[1::2].tolist(), strict=True))
+        ended = [run for run in open_runs if run not in runs]
+        done += [(run[0], open_runs.pop(run), run[1], row) for run in ended]
+        for run in runs - open_runs.keys():
+            open_runs[run] = row
+    return np.array(sorted(done), dtype=np.float64).reshape(-1, 4)
