@@ -117,6 +117,9 @@ def test_the_whole_robot_is_started_with_parameters_that_its_nodes_have(monkeypa
         used = [part.values[0].values[0] for part in given.values()]
         assert nodes[name]["namespace"].values == nodes["slam"]["namespace"].values
         assert set(used) <= set(declared)
+    file, given = nodes["slam"]["parameters"]
+    assert file.values == ("params_file",)
+    assert given["robot"].values[0].values == nodes["lidar"]["parameters"][0]["robot"].values[0].values
     # Where slam listens, the parts publish.
     said = {name: to.values for part in PARTS for name, to in nodes[part].get("remappings", [])}
     assert said == {name: to.values for name, to in nodes["slam"]["remappings"]}

@@ -56,12 +56,11 @@ def driven(
         "whole", scan=ScanMessage, odom=OdometryMessage, pose=PoseWithCovarianceStamped, imu__data=Imu
     )
     commands = observer.node.create_publisher(Twist, "cmd_vel", 10)
-    processes.start("slam", namespace="whole", frame_prefix="whole/")
     board = partial(SimulatedBoard, built / "board", built / "mega.elf")
     with RunningWorld(WorldConfig(ROOMS["furnished_room"], seed=1), board, folder) as world:
         robot = RobotConfig(BaseConfig(port=str(world.base_port)), LidarPart(port=str(world.lidar_port)))
         save_robot(folder / "robot.yaml", robot)
-        for part in ("lidar", "base"):
+        for part in ("slam", "lidar", "base"):
             processes.start(part, namespace="whole", frame_prefix="whole/", robot=folder / "robot.yaml")
         assert observer.comes("pose", 3, seconds=120.0), observer.faults()
         for v, omega, amount in WAY:

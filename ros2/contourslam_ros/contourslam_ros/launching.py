@@ -15,7 +15,9 @@ PARAMETERS = PathJoinSubstitution([SHARE, "config", "parameters.yaml"])
 PICTURE = PathJoinSubstitution([SHARE, "rviz", "contourslam.rviz"])
 
 
-def node_and_rviz(executable: str, map_file: DeclareLaunchArgument, *more: Any) -> LaunchDescription:
+def node_and_rviz(
+    executable: str, map_file: DeclareLaunchArgument, *more: Any, texts: tuple[str, ...] = ()
+) -> LaunchDescription:
     """Say what is started.
 
     Parameters
@@ -26,6 +28,8 @@ def node_and_rviz(executable: str, map_file: DeclareLaunchArgument, *more: Any) 
         What the map file is to it, and whether it must be given.
     *more
         What else is declared and started.
+    texts : tuple of str
+        Names of further arguments that are parameters of the node.
     """
     simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
     return LaunchDescription(
@@ -48,10 +52,10 @@ def node_and_rviz(executable: str, map_file: DeclareLaunchArgument, *more: Any) 
                 parameters=[
                     LaunchConfiguration("params_file"),
                     {
-                        "frame_prefix": ParameterValue(LaunchConfiguration("frame_prefix"), value_type=str),
-                        "map_file": ParameterValue(LaunchConfiguration("map_file"), value_type=str),
-                        "use_sim_time": simulated,
-                    },
+                        name: ParameterValue(LaunchConfiguration(name), value_type=str)
+                        for name in ("frame_prefix", "map_file", *texts)
+                    }
+                    | {"use_sim_time": simulated},
                 ],
                 remappings=[("scan", LaunchConfiguration("scan")), ("odom", LaunchConfiguration("odom"))],
             ),

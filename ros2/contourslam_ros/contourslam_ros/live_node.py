@@ -3,6 +3,7 @@
 import tempfile
 import time
 from collections import OrderedDict, deque
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ from contourslam.live.rehearsal import SHORT, stages
 from contourslam.live.session import Session
 from contourslam.live.warming import warm_up
 from contourslam.live.worker import Worker
+from contourslam.robot.config import load_robot
+from contourslam.robot.live_map import settings_of
 from contourslam.scan import LaserScan, Odometry
 from contourslam_ros.frames import SENT
 from contourslam_ros.grid_sender import GridSender
@@ -29,7 +32,7 @@ from contourslam_ros.map_sender import MapSender
 from contourslam_ros.messages import diagnostic_message, header, pose_message, transform_message
 from contourslam_ros.sensors import Sensors
 from contourslam_ros.services import Services
-from contourslam_ros.settings import declared
+from contourslam_ros.settings import Settings, declared
 
 HELD = 200  # odometry readings before the first scan
 
@@ -61,7 +64,7 @@ class LiveNode(Node):
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        self.settings = declared(self)
+        self.settings = _of_robot(declared(self))
         self.config = self.settings.node
         self.failure: BaseException | None = None
         self._sensors = Sensors(
@@ -198,3 +201,10 @@ class LiveNode(Node):
             told = (*self._session.diagnostics(time.monotonic()), self._latencies.diagnostic())
         head = header(self.get_clock().now().to_msg(), "")
         self._diagnostics.publish(diagnostic_message(head, self.get_fully_qualified_name(), told))
+
+
+def _of_robot(settings: Settings) -> Settings:
+    """Let the core know what the robot's file says, where there is one."""
+    if not settings.node.robot:
+        return settings
+    return replace(settings, core=settings_of(load_robot(Path(settings.node.robot).expanduser()), settings.core))

@@ -57,6 +57,8 @@ class NodeConfig:
     """Half axes of the drawn ellipses, in standard deviations."""
     map_file: str = ""
     """slam keeps its map here, saved by itself, and continues it where it is there; localization needs it."""
+    robot: str = ""
+    """The robot's file, robot.yaml: its lidar's range and its wheels' noise are then used, unless given here."""
 
     def __post_init__(self) -> None:
         if self.odometry not in ("topic", "tf", "none"):

@@ -26,6 +26,7 @@ def generate_launch_description() -> LaunchDescription:
         part("lidar", remappings=[("scan", LaunchConfiguration("scan"))]),
         part("base", remappings=[("odom", LaunchConfiguration("odom"))]),
         part("camera", condition=IfCondition(LaunchConfiguration("camera"))),
+        texts=("robot",),
     )
 
 
