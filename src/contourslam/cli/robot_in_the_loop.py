@@ -1,0 +1,80 @@
+"""``contourslam robot-in-the-loop``: the whole robot at real time, its devices simulated."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from contourslam.cli.console import Bar, complain, make_way, prepare_folder, print_json
+from contourslam.cli.interrupt import INTERRUPTED, Interrupt
+from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
+from contourslam.cli.run import DEFAULTS
+
+
+@dataclass(frozen=True)
+class RobotInTheLoop:
+    """Let the robot drive at real time with its real drivers, firmware and mapping; the world around is simulated.
+
+    A room in MuJoCo feeds a simulated YDLidar X4 and a simulated Arduino Mega that runs the real firmware, each on a
+    serial port; `make firmware` builds the two programs. The folder gets a page, the run, and the recording. The exit
+    code is 1 where the errors are larger than 3 cm and 0.01 rad.
+
+    Example: contourslam robot-in-the-loop -o out/loop --fault damaged
+    """
+
+    output: Output
+    overwrite: Overwrite = False
+    room: str = "furnished_room"
+    """One of the simulated rooms."""
+    seed: int = 1
+    """Of all that chance decides."""
+    seconds: float = 100.0
+    """How long it drives, s."""
+    fault: str = "none"
+    """What goes wrong: none, unplugged (the lidar, for 3 s) or damaged (5 % of all serial bytes)."""
+    speed: float = 0.3
+    """m/s."""
+    pictures: float = 1.0
+    """Pictures a second; 0 for no camera."""
+    record: Flag = False
+    """Also write the recording."""
+    firmware: Path = Path("firmware/mega/build")
+    """Folder that the firmware and the simulated board are built in."""
+    json: Json = False
+    settings: Settings = field(default_factory=lambda: DEFAULTS)
+
+    def execute(self, command: str) -> int:
+        """Drive, write the report and say how it went."""
+        from contourslam.experiments.robot_in_the_loop import Firmware, LoopConfig, fault_named, robot_in_the_loop
+        from contourslam.report.loop_page import kept, loop_metrics, write_loop_report
+
+        config = LoopConfig(
+            self.seed, self.room, self.seconds, fault_named(self.fault), self.speed, self.pictures, self.settings
+        )
+        prepare_folder(self.output, overwrite=self.overwrite)
+        recording = self.output / "recording" if self.record else None
+        if recording is not None:
+            make_way(recording, overwrite=self.overwrite)
+        with Interrupt() as interrupt, Bar("driving") as bar:
+            result = robot_in_the_loop(
+                config, Firmware.built_in(self.firmware), recording=recording, progress=bar.to,
+                stopped=lambda: interrupt.requested,
+            )  # fmt: skip
+        written = write_loop_report(self.output, result, command=command)
+        if self.json:
+            print_json(loop_metrics(result))
+        else:
+            online = result.online
+            print(
+                f"{written}: {len(result.run.stamps)} scans, {result.travelled:.1f} m, {result.picture_count} pictures"
+            )
+            print(
+                f"RMSE as known at the time: x {online['x']:.4f} m, y {online['y']:.4f} m, "
+                f"heading {online['theta']:.4f} rad"
+            )
+            print(f"late by more than 20 ms: {result.late:.2%} of the world's steps")
+        if interrupt.requested:
+            complain("interrupted; the page shows what was done")
+            return INTERRUPTED
+        if not kept(result):
+            complain("the errors are larger than 3 cm and 0.01 rad")
+            return 1
+        return 0
