@@ -120,7 +120,7 @@ class MegaDevice:
             self._send(self._hello())
 
     def _hello(self) -> HelloReply:
-        return HelloReply(self.version, 1, 2, 3, 20, 300, 1, 2, 0.25, 1.5, 0.0, 0.125)
+        return HelloReply(self.version, 1, 2, 3, 20, 300, 1 if self._told else 0, 2, 0.25, 1.5, 0.0, 0.125)
 
     def _state(self) -> State:
         left, right = ((int(t) + 2**31) % 2**32 - 2**31 for t in np.floor(self.position - self._zero))

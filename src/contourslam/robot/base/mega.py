@@ -10,7 +10,7 @@ from typing import Self
 
 from contourslam.robot.base.commander import Commander
 from contourslam.robot.base.link import BOOT, MegaLink
-from contourslam.robot.base.messages import Ack, HelloReply, State
+from contourslam.robot.base.messages import Ack, Hello, HelloReply, State
 from contourslam.robot.base.odometry import BaseOdometry
 from contourslam.robot.base.states import BaseState, StateReader
 from contourslam.robot.config import BaseConfig
@@ -25,6 +25,7 @@ from contourslam.robot.device_errors import (
 
 _QUIET = 0.2  # s without a byte after which nothing is sent: a boot loader that hears bytes waits for a program
 _NOISY = 3.0  # s of bytes without one sound frame
+_ASK = 1.0  # s between two questions for what a greeting left out
 _KEPT = 500  # states that wait for a reader
 _MOST_RESETS, _RESET_SPAN = 3, 60.0  # more than so many in so many seconds is a supply that does not hold
 
@@ -85,7 +86,7 @@ class MegaBase:
         self._count = 0
         self._error: Exception | None = None
         self._resets: deque[float] = deque(maxlen=_MOST_RESETS + 1)
-        self._closing = False
+        self._closing, self._asked = False, 0.0
         self.info: HelloReply = self._link.open()
         self._thread = threading.Thread(target=self._run, name="base", daemon=True)
         self._thread.start()
@@ -248,6 +249,7 @@ class MegaBase:
             elif isinstance(message, Ack):
                 self._commander.heard(message)
             elif isinstance(message, HelloReply):
+                self.info = message
                 self._reader.greeted()
         return bool(frames)
 
@@ -259,6 +261,9 @@ class MegaBase:
         if self._reader.resets > resets:
             self._commander.halted()
             self._count_reset()
+        if state.gyro is not None and not self.info.imu_kind and time.monotonic() - self._asked > _ASK:
+            self._asked = time.monotonic()  # it greeted before it had found its IMU
+            self._link.send(Hello())
         with self._changed:
             before = self._states[-1] if self._states else None
             self.watchdog_stops += state.watchdog and before is not None and not before.watchdog
