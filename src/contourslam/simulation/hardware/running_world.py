@@ -1,6 +1,8 @@
 """The live world in a process of its own, so that nothing that the robot's computer does holds it up."""
 
+import contextlib
 import multiprocessing
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from multiprocessing.connection import Connection
@@ -15,6 +17,7 @@ from contourslam.simulation.hardware.live_world import Board, LiveWorld, Record,
 MakeBoard = Callable[[], AbstractContextManager[Board]]
 Pose = tuple[float, float, float]
 _READY, _DONE = 60.0, 20.0  # s until the world stands, and until it has told what happened
+_BEFORE_OTHERS = -10
 _LISTEN = 10  # steps between two looks for orders
 
 
@@ -115,6 +118,8 @@ def _live(
     period: float,
 ) -> None:
     """What the process does."""
+    with contextlib.suppress(OSError):  # without the rights to it, it runs like any other
+        os.nice(_BEFORE_OTHERS)  # physics waits for nobody
     try:
         with make_board() as board:
             world = LiveWorld(config, board, folder)
