@@ -218,3 +218,90 @@ def _blurred(picture: Floats, sigma: float) -> Floats:
             np.zeros_like(picture),
         )
     return picture
+
+
+def scan_board(
+    T_lidar_board: Floats,
+    corners: tuple[int, int],
+    square: float,
+    angles: Floats,
+    walls: float,
+    *,
+    margin: float = 0.0,
+    noise: float = 0.01,
+    seed: int = 0,
+) -> Floats:
+    """Ranges of a lidar that sees a board in the middle of a square room.
+
+    Parameters
+    ----------
+    T_lidar_board : ndarray, shape (4, 4)
+        m; the board's origin is its first inner corner.
+    corners : tuple of (int, int)
+        Inner corners along and across.
+    square : float
+        Side of one square, m.
+    angles : ndarray, shape (n,)
+        Of the beams, rad.
+    walls : float
+        Distance of the four walls from the lidar, m.
+    margin : float
+        Of the board around its squares, m.
+    noise : float
+        Standard deviation, m.
+    seed : int
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        m.
+    """
+    beams = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(angles.size)])
+    ranges = walls / np.abs(beams[:, :2]).max(axis=1)
+    turn, origin = T_lidar_board[:3, :3], T_lidar_board[:3, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (origin @ turn[:, 2]) / (beams @ turn[:, 2])
+        local = (beams * reach[:, None] - origin) @ turn[:, :2] - 0.5 * square * (np.array(corners) - 1.0)
+        hit = (reach > 0.0) & (reach < ranges)
+        hit &= (np.abs(local) < 0.5 * square * (np.array(corners) + 1.0) + margin).all(axis=1)
+    ranges = np.where(hit, reach, ranges)
+    return ranges + np.random.default_rng(seed).normal(0.0, noise, angles.size)
+
+
+def boards_before(
+    T_lidar_camera: Floats, corners: tuple[int, int], square: float, count: int, *, seed: int = 0
+) -> list[Floats]:
+    """Place boards that the lidar's plane cuts, each tilted differently, where a camera sees them.
+
+    Parameters
+    ----------
+    T_lidar_camera : ndarray, shape (4, 4)
+        m.
+    corners : tuple of (int, int)
+        Inner corners along and across.
+    square : float
+        Side of one square, m.
+    count : int
+    seed : int
+
+    Returns
+    -------
+    list of ndarray, shape (4, 4)
+        ``T_lidar_board``, m.
+    """
+    rng = np.random.default_rng(seed)
+    middle = 0.5 * square * np.array([corners[0] - 1.0, corners[1] - 1.0, 0.0])
+    places: list[Floats] = []
+    while len(places) < count:
+        bearing, reach = rng.uniform(-math.pi, math.pi), rng.uniform(0.7, 2.2)
+        # The board faces the lidar (its z axis points away from who sees it), then is tilted.
+        facing = np.array([[math.sin(bearing), 0.0, math.cos(bearing)], [-math.cos(bearing), 0.0, math.sin(bearing)],
+                           [0.0, -1.0, 0.0]])  # fmt: skip
+        tilt = rotation_from_vector((rng.uniform(-0.7, 0.7), rng.uniform(-0.7, 0.7), 0.0))
+        turn = facing @ tilt @ rotation_from_vector((0.0, 0.0, rng.uniform(-0.3, 0.3)))
+        at = reach * np.array([math.cos(bearing), math.sin(bearing), 0.0]) + (0.0, 0.0, rng.uniform(-0.08, 0.08))
+        seen = T_lidar_camera[:3, :3].T @ (at - T_lidar_camera[:3, 3])
+        # A lens that looks up from above the board sees it only at its rim.
+        if math.acos(seen[2] / float(np.linalg.norm(seen))) < math.radians(100.0):
+            places.append(rigid(turn, at - turn @ middle))
+    return places
