@@ -200,10 +200,10 @@ export class LaneMap {
     const seen = new Set(frame.matched), missed = new Set(frame.missed), style = colour("corner");
     for (let i = 0; i < n; i++) {
       const id = map.corner_ids[i], x = sx(map.corners[2 * i]), y = sy(map.corners[2 * i + 1]);
-      const [p, q, turn] = axes.subarray(3 * i, 3 * i + 3), k = camera.scale * lift;
+      const [p, q, turn] = axes.subarray(3 * i, 3 * i + 3), k = camera.scale * lift, thin = camera.scale < 20 ? 0.7 : 1;
       const chosen = selected && selected.lane === this.lane && selected.id === id;
       ctx.strokeStyle = ctx.fillStyle = missed.has(id) ? colour("bad") : seen.has(id) ? colour("good") : style;
-      ctx.lineWidth = chosen ? 2 : 1;
+      ctx.lineWidth = chosen ? 2 : thin;
       ctx.beginPath();
       ctx.ellipse(x, y, Math.min(p * k, 4e3), Math.min(q * k, 4e3), -turn, 0, 2 * Math.PI);
       ctx.globalAlpha = 0.14;
@@ -227,7 +227,7 @@ export class LaneMap {
 
   /** Two short strokes along the sides; the dot is filled where matter fills the angle. */
   cornerMark(x, y, direction, opening, convex) {
-    const { ctx } = this, length = 8;
+    const { ctx, camera } = this, length = Math.max(4, Math.min(0.28 * camera.scale, 9));
     ctx.lineWidth = 1.5;
     ctx.beginPath();
     for (const side of [-0.5, 0.5]) {
@@ -237,7 +237,7 @@ export class LaneMap {
     }
     ctx.stroke();
     ctx.beginPath();
-    ctx.arc(x, y, 2.6, 0, 2 * Math.PI);
+    ctx.arc(x, y, length / 3.2, 0, 2 * Math.PI);
     if (!convex) {
       ctx.save();
       ctx.fillStyle = colour("map");
@@ -382,7 +382,7 @@ export class LaneMap {
   scaleBar(width, height) {
     const { ctx, camera } = this, most = Math.min(140, width / 3);
     const metres = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200].findLast((m) => m * camera.scale <= most) || 0.1;
-    const long = metres * camera.scale, x = -width / 2 + 14, y = height / 2 - 40;
+    const long = metres * camera.scale, x = -width / 2 + 14, y = height / 2 - (width < 480 ? 62 : 40);
     ctx.strokeStyle = ctx.fillStyle = colour("muted");
     ctx.lineWidth = 1.5;
     ctx.beginPath();

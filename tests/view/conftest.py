@@ -1,0 +1,85 @@
+"""A robot that drives a circle in a room with a box, without a simulator; players and servers over it."""
+
+import math
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contourslam.config import Config, SlamConfig
+from contourslam.scan import Odometry, TruePose
+from contourslam.view.access import new_token
+from contourslam.view.pace import Pace
+from contourslam.view.replayed import Replayed
+from contourslam.view.server import ViewServer
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SETTINGS = Config(back_end="ekf", slam=SlamConfig(walls=True, contour_matching=True))
+
+
+@pytest.fixture(scope="session")
+def drive(room, scan_of):
+    """Messages of so many scans, 5 a second, with odometry that drifts and true poses."""
+
+    def make(scans: int = 40):
+        outside, box = [(0, 0), (6, 0), (6, 5), (0, 5)], [(4, 2), (5, 2), (5, 2.8), (4, 2.8)]
+        segments = room(outside, box)
+        for i in range(scans):
+            stamp, turn = 100.0 + 0.2 * i, 0.05 * i
+            pose = (2.0 + 0.8 * math.sin(turn), 1.7 + 0.8 * (1.0 - math.cos(turn)), turn)
+            drifted = (0.81 * math.sin(1.01 * turn), 0.81 * (1.0 - math.cos(1.01 * turn)), 1.01 * turn)
+            yield Odometry(stamp, np.array(drifted))
+            yield TruePose(stamp, np.array(pose))
+            yield replace(scan_of(segments, pose, beams=240, sigma=0.01, seed=i), stamp=stamp)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def until() -> Callable[..., None]:
+    """Wait for something to come true, and fail where it does not in good time."""
+
+    def wait(true: Callable[[], object], seconds: float = 60.0) -> None:
+        end = time.monotonic() + seconds
+        while not true():
+            assert time.monotonic() < end, "it did not come true"
+            time.sleep(0.01)
+
+    return wait
+
+
+@pytest.fixture
+def replayed(drive) -> Iterator[Callable[..., Replayed]]:
+    """Players over the drive; they end with the test."""
+    made: list[Replayed] = []
+
+    def make(scans: int = 40, detectors=(), *, config: Config = SETTINGS, **more) -> Replayed:
+        more.setdefault("pace", Pace(math.inf))
+        one = Replayed(drive(scans), config, detectors, title="circle", duration=0.2 * (scans - 1), **more)
+        made.append(one)
+        return one
+
+    yield make
+    for one in made:
+        one.pace.stop()
+        if one.player.ident is not None:
+            one.player.join()
+
+
+@pytest.fixture
+def served(replayed) -> Iterator[Callable[..., tuple[Replayed, ViewServer]]]:
+    """Players that are served; the server ends with the test."""
+    with ExitStack() as stack:
+
+        def make(scans: int = 40, detectors=(), *, host="127.0.0.1", secret=False, **more):
+            one = replayed(scans, detectors, **more)
+            token = new_token() if secret else ""
+            server = stack.enter_context(ViewServer(one.show, host=host, token=token, lag=one.lag))
+            one.player.start()
+            return one, server
+
+        yield make
