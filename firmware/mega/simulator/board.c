@@ -74,6 +74,7 @@ static uint32_t to_head, to_tail, from_count;
 
 static avr_cycle_count_t asleep, in_interrupts, interrupt_start, longest_interrupt;
 static unsigned resets;
+static bool boot_loader; /* there is one, which hides why the chip was reset */
 static double hang_at = -1, unplug_at = -1, plug_at = -1, stick_at = -1, free_at = -1, poke_at = -1;
 static uint32_t poke_address, poke_value;
 static uint16_t hung_word;
@@ -288,6 +289,11 @@ static void run(const request_t *request) {
 	}
 }
 
+static uint8_t hide(struct avr_t *of, avr_io_addr_t address, void *param) {
+	(void)of, (void)address, (void)param;
+	return 0;
+}
+
 static void be_quiet(avr_t *of, const int level, const char *format, va_list arguments) {
 	(void)of;
 	if (level == LOG_ERROR) vfprintf(stderr, format, arguments);
@@ -311,6 +317,7 @@ static void begin(const char *path) {
 	uart_in = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent, NULL);
 	avr_irq_register_notify(avr_get_interrupt_irq(avr, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING, on_interrupt, NULL);
+	if (boot_loader) avr_register_io_read(avr, 0x54, hide, NULL); /* MCUSR */
 	inertial_begin(&inertial, avr);
 	freeze_pwm_timers();
 	for (int side = 0; side < 2; side++) {
@@ -324,7 +331,8 @@ static void begin(const char *path) {
 static void take_options(int count, char **words) {
 	static const struct option OPTIONS[] = {
 		{"imu", 1, 0, 'i'},		{"imu-axes", 1, 0, 'a'}, {"unplug-at", 1, 0, 'u'}, {"plug-at", 1, 0, 'p'},
-		{"stick-at", 1, 0, 's'}, {"free-at", 1, 0, 'f'}, {"hang-at", 1, 0, 'h'}, {"poke", 1, 0, 'k'}, {0, 0, 0, 0}};
+		{"stick-at", 1, 0, 's'}, {"free-at", 1, 0, 'f'}, {"hang-at", 1, 0, 'h'}, {"poke", 1, 0, 'k'},
+		{"boot-loader", 0, 0, 'b'}, {0, 0, 0, 0}};
 	for (int option; (option = getopt_long(count, words, "", OPTIONS, NULL)) >= 0;) {
 		int axes[3];
 		switch (option) {
@@ -341,6 +349,7 @@ static void take_options(int count, char **words) {
 			case 's': stick_at = atof(optarg); break;
 			case 'f': free_at = atof(optarg); break;
 			case 'h': hang_at = atof(optarg); break;
+			case 'b': boot_loader = true; break;
 			case 'k':
 				if (sscanf(optarg, "%lf,%" SCNu32 ",%" SCNu32, &poke_at, &poke_address, &poke_value) != 3 ||
 					poke_address > 0x21FC)
@@ -351,7 +360,7 @@ static void take_options(int count, char **words) {
 	}
 	if (optind != count - 1)
 		fail("usage: board [--imu mpu9250|mpu6500|none] [--imu-axes 1,2,3] [--unplug-at S] [--plug-at S] [--stick-at S] "
-			 "[--free-at S] [--hang-at S] [--poke S,ADDRESS,VALUE] FIRMWARE");
+			 "[--free-at S] [--hang-at S] [--poke S,ADDRESS,VALUE] [--boot-loader] FIRMWARE");
 }
 
 int main(int count, char **words) {

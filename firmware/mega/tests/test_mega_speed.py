@@ -62,6 +62,21 @@ def test_a_crawl_of_a_tick_each_20_ms_is_smooth(bench: Callable[..., Bench]) -> 
     speeds = drive(mega, motors, (50, -50), 2.0)
     assert settled_after([left for left, _ in speeds], 50) < 0.5
     assert settled_after([right for _, right in speeds], -50) < 0.5
+    held = speeds[round(1.0 / STEP) :]
+    assert max(abs(left - 50) for left, _ in held) < 0.03 * 50
+    assert max(abs(right + 50) for _, right in held) < 0.03 * 50
+
+
+def test_an_edge_at_the_very_end_of_a_period_is_timed_rightly(bench: Callable[..., Bench]) -> None:
+    """Edges drift slowly through the periods of the control; a wrong time of one would be taken for another speed."""
+    mega = bench("--imu", "none")
+    mega.run(0.1)
+    mega.run(0.05, Tune(0.1, 0.0, 0.0, 0.0))
+    for count in range(1, 101):
+        mega.step(0.1001, mega.frame(Drive(2000, -2000)), (200 * count, -200 * count))
+    settled = [state.duty for state in mega.states() if abs(state.ticks[0]) > 1000]
+    assert len(settled) > 450
+    assert {duty for both in settled for duty in both} <= {-1, 0, 1}
 
 
 def test_a_reversal_settles_in_half_a_second(bench: Callable[..., Bench]) -> None:

@@ -74,8 +74,11 @@ def test_before_any_command_the_motors_stand(bench: Callable[..., Bench]) -> Non
     assert greeting.reset_cause == 1
 
 
-def test_a_loop_that_hangs_has_its_motors_off_and_starts_anew(bench: Callable[..., Bench]) -> None:
-    mega = bench("--hang-at", "1.0")
+@pytest.mark.parametrize("boot_loader", [[], ["--boot-loader"]], ids=["bare", "behind_a_boot_loader"])
+def test_a_loop_that_hangs_has_its_motors_off_and_starts_anew(
+    bench: Callable[..., Bench], boot_loader: list[str]
+) -> None:
+    mega = bench("--hang-at", "1.0", *boot_loader)
     mega.run(0.1)
     while mega.time < 1.0:
         mega.run(0.05, Drive(3000, 3000))
