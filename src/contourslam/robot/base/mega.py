@@ -187,7 +187,8 @@ class MegaBase:
             seen = self._count
         while not stopped():
             with self._changed:
-                self._changed.wait_for(lambda: self._count > seen or self._error or self._closing, 0.1)  # noqa: B023
+                if self._count == seen and self._error is None and not self._closing:
+                    self._changed.wait(0.1)
                 missed = max(self._count - seen - len(self._states), 0)
                 self.dropped += missed
                 new = list(self._states)[len(self._states) - (self._count - seen - missed) :]
