@@ -298,7 +298,8 @@ def test_a_base_that_is_gone_for_good_is_told(mega: MegaDevice, base_of: Callabl
 def test_a_supply_that_dips_is_told(mega: MegaDevice, base_of: Callable[..., MegaBase]) -> None:
     with base_of() as base:
         for count in range(1, 5):
-            time.sleep(0.1)
+            heard = base.frames
+            assert until(lambda heard=heard: base.frames > heard + 5)
             mega.reset()
             assert until(lambda count=count: base.resets == count or base._error is not None)
         with pytest.raises(DevicePowerError, match="supply dips"):
