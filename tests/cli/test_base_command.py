@@ -12,6 +12,7 @@ import pytest
 
 from contourslam.cli import main
 from contourslam.recordings import WheelReading, write_recording, write_trajectory
+from contourslam.robot.base import self_test
 from contourslam.robot.base.messages import BATTERY_LOW
 from contourslam.robot.base.odometry import arc
 from contourslam.robot.config import BaseConfig, LidarPart, RobotConfig, load_robot, save_robot
@@ -63,6 +64,13 @@ def test_on_a_terminal_base_goes_on_live(device: MegaDevice) -> None:
     assert said.count(b"\x1b[H\x1b[2J") > 2 and b"wheels:" in said
 
 
+@pytest.fixture
+def short_spin(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, seconds in (("_REACH", 0.5), ("_MEASURE", 0.5), ("_REST", 0.1)):
+        monkeypatch.setattr(self_test, name, seconds)
+
+
+@pytest.mark.usefixtures("short_spin")
 def test_spin_turns_each_wheel_by_itself(device: MegaDevice, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["base", "--port", str(device.line.path), "--spin", "--wheels-lifted", "--json"]) == 0
     left, right = json.loads(capsys.readouterr().out)["spin"]
@@ -73,6 +81,7 @@ def test_spin_turns_each_wheel_by_itself(device: MegaDevice, capsys: pytest.Capt
     assert abs(device.speed).max() < 100.0
 
 
+@pytest.mark.usefixtures("short_spin")
 def test_spin_finds_wheels_that_are_mixed_up(
     device: MegaDevice, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
