@@ -20,6 +20,7 @@ Grey = NDArray[np.uint8]
 
 _VIEWS_DEG = (75.0, 110.0, 45.0)  # full angles of the flat views, the likeliest first
 _PLACES = 3  # where most saddle points are
+_MUCH_LESS = 0.3  # of what the best place has, and a place is not worth a search, which takes long where none is
 _COARSER = 4  # pixels for one of the map of how dense they are
 _FINER = 1.3  # pixels of a flat view for one of the picture's, on the axis
 _LARGEST_VIEW = 1400  # pixels
@@ -41,11 +42,11 @@ def find_corners(picture: Grey, board: Board, rough: FisheyeModel) -> Floats | N
         Pixels, in the order of :attr:`Board.points`; None where the board is not seen whole.
     """
     cv2 = opencv()
-    for place in _likely_places(picture, cv2):
+    for rank, place in enumerate(_likely_places(picture, cv2)):
         rays, _ = rough.unproject(place[None])
         if not np.isfinite(rays).all():
             continue
-        for angle in _VIEWS_DEG:
+        for angle in _VIEWS_DEG if rank == 0 else _VIEWS_DEG[:1]:
             found = _search_view(cv2, picture, board, rough, rays[0], math.radians(angle))
             if found is not None:
                 return found
@@ -71,10 +72,11 @@ def _likely_places(picture: Grey, cv2: Any) -> list[Floats]:
     width = 0.035 * max(picture.shape) / _COARSER
     coarse = cv2.resize(saddle, None, fx=1.0 / _COARSER, fy=1.0 / _COARSER, interpolation=cv2.INTER_AREA)
     density = cv2.GaussianBlur(coarse, (0, 0), width)
-    places = []
+    places: list[Floats] = []
+    most = float(density.max())
     for _ in range(_PLACES):
         row, column = np.unravel_index(int(np.argmax(density)), density.shape)
-        if density[row, column] <= 0.0:
+        if density[row, column] <= _MUCH_LESS * most:
             break
         places.append(_COARSER * (np.array([float(column), float(row)]) + 0.5) - 0.5)
         cv2.circle(density, (int(column), int(row)), int(3.0 * width), 0.0, -1)

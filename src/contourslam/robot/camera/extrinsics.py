@@ -28,7 +28,7 @@ _NEAR = 0.6  # m: the camera is not farther from the lidar than this
 _GRID_DEG = 15.0
 _STARTS = 40  # of the rotations that fit most stands, how many are followed up
 _GATES = (0.4, 0.2, 0.1, 0.06)  # m: how far a point may be off the plane, from the first round to the last
-_CERTAIN = 0.02  # m: points so near to all boards are no chance
+_CERTAIN, _MOST = 0.02, 0.7  # m: points so near to so many of the boards are no chance
 _EDGE = 0.02  # m: a beam so close to the board's edge may have hit both the board and what is behind it
 _FEWEST = 5  # points on a board
 _SURE_M, _SURE_DEG, _GOOD_M, _GOOD_DEG = 0.05, 2.0, 0.01, 0.5
@@ -143,7 +143,7 @@ def find_extrinsics(stands: Sequence[Stand], board: Board, *, margin: float = 0.
         score = float(sum(found.used)) - found.rms / _GATES[-1]
         if score > best[0]:
             best = score, found
-        if all(found.used) and found.rms < _CERTAIN:
+        if sum(found.used) >= max(_MOST * len(stands), LEAST_STANDS + 2) and found.rms < _CERTAIN:
             break
     found = best[1]
     if found is None or sum(found.used) < LEAST_STANDS:
