@@ -12,6 +12,7 @@ from contourslam.maps.saved_map import SavedMap
 from contourslam.scene.atlas import BORDER, LARGEST
 from contourslam.scene.behind import in_line, walls_behind, whole_walls
 from contourslam.scene.blending import blend
+from contourslam.scene.bodies import bodies, lids
 from contourslam.scene.choice import choose
 from contourslam.scene.exposure import Exposure, solve_exposure, trust
 from contourslam.scene.facets import contour_points, find_facets
@@ -130,10 +131,10 @@ def raise_surfaces(saved: SavedMap, poses: Floats, options: SceneOptions) -> tup
     walls = clean_walls(saved.walls, points)
     if not walls:
         raise MapError("the map holds no walls, of which a scene is made; map the recording again with --walls")
-    facets = square_up(find_facets(points, keys, walls), walls)
+    facets, columns = find_facets(points, keys, walls)
     longest = min(30.0, options.texel * (LARGEST - 2 * BORDER - SIDE))
     surfaces = []
-    for name, segment in _short(join_ends(walls + facets), longest):
+    for name, segment in _short(join_ends(walls + square_up(facets, walls)) + columns, longest):
         kind = name.partition("-")[0]
         height = options.height if kind == "wall" else options.furniture_height
         surfaces.append(upright(name, kind, segment[0], segment[1], height))
@@ -185,7 +186,8 @@ def cut_to_height(
     closed = walls_behind(looked_at, heights, poses)
     walls = [*whole_walls(looked_at, heights), *closed]
     cut = [s.cut(_settled(s, h, walls, options)) for s, h in zip(looked_at, heights, strict=True)]
-    return (*cut, *(s.cut(options.height) for s in closed), *(s for s in tall if s.kind == "floor"))
+    standing = (*cut, *(s.cut(options.height) for s in closed))
+    return (*standing, *lids(standing, options.height), *(s for s in tall if s.kind == "floor"))
 
 
 def _settled(surface: Surface, found: float | None, walls: list[Surface], options: SceneOptions) -> float:
@@ -193,6 +195,20 @@ def _settled(surface: Surface, found: float | None, walls: list[Surface], option
     if found is not None:
         return found
     return options.height if surface.kind == "wall" or in_line(surface, walls) else options.furniture_height
+
+
+def _lid_colours(
+    surfaces: tuple[Surface, ...], images: list[Bytes], seen: list[NDArray[np.bool_]]
+) -> dict[str, Floats]:
+    """Colour of each lid: the mean of the upper half of that side of the same thing that is seen best."""
+    colours = {}
+    for group in bodies(surfaces):
+        for side in sorted(group, key=lambda n: int(seen[n].sum())):  # the best last
+            upper = slice(0, max(len(images[side]) // 2, 1))
+            known = images[side][upper][seen[side][upper]]
+            if len(known):
+                colours.update({f"top-of-{surfaces[n].name}": known.mean(axis=0) for n in group})
+    return colours
 
 
 def build_scene(
@@ -245,11 +261,13 @@ def build_scene(
     trusted = np.where(choice.views >= 0, trust(exposure)[choice.views], 0.0).astype(np.float32)
     colours, count = blend(samples.colours, samples.weights, exposure.factors(choice), trusted)
     rest(0.95)
-    textures, seen = [], []
-    for index in range(len(surfaces)):
-        mask = grid.image(index, count > 0)
-        textures.append(fill(grid.image(index, colours), mask, round(_FILLED / texel)))
-        seen.append(mask)
+    seen = [grid.image(index, count > 0) for index in range(len(surfaces))]
+    images = [grid.image(index, colours) for index in range(len(surfaces))]
+    likes = _lid_colours(surfaces, images, seen)
+    textures = [
+        fill(image, mask, round(_FILLED / texel), likes.get(surface.name))
+        for surface, image, mask in zip(surfaces, images, seen, strict=True)
+    ]
     notes = []
     if texel > options.texel:
         notes.append(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.maps.saved_map import Contoured
+from contourslam.scene.columns import find_columns
 from contourslam.scene.walls import Named, draw_out, frame
 
 Floats = NDArray[np.float64]
@@ -43,7 +44,7 @@ def contour_points(keyframes: Contoured | None) -> tuple[Floats, NDArray[np.int6
     return np.hstack([pose[:, :2] + turned[0], turned[1]]), keys
 
 
-def find_facets(points: Floats, keys: NDArray[np.int64], walls: Named) -> Named:
+def find_facets(points: Floats, keys: NDArray[np.int64], walls: Named) -> tuple[Named, Named]:
     """Find the straight facets that contours show where no wall of the map is.
 
     Parameters
@@ -55,12 +56,15 @@ def find_facets(points: Floats, keys: NDArray[np.int64], walls: Named) -> Named:
 
     Returns
     -------
-    list of (str, ndarray of shape (2, 2))
+    facets : list of (str, ndarray of shape (2, 2))
         "contour-0" and so on, each as seen from free space from the left to the right, m.
+    columns : list of (str, ndarray of shape (2, 2))
+        Those of round columns, as from :func:`contourslam.scene.columns.find_columns`.
     """
     free = _often_seen(points, keys) if len(points) else np.zeros(0, np.bool_)
     for _, wall in walls:
         free &= ~_on(wall, points)
+    columns, free = find_columns(points, free)
     rest, order = points[free], keys[free]
     step = np.hypot(*np.diff(rest[:, :2], axis=0).T)
     ends = np.flatnonzero((step > _BREAK) | (np.diff(order) != 0)) + 1
@@ -76,7 +80,7 @@ def find_facets(points: Floats, keys: NDArray[np.int64], walls: Named) -> Named:
                 found += _facets_along(part, rest)
     found.sort(key=lambda facet: -float(np.hypot(*(facet[1] - facet[0]))))
     kept = [facet for n, facet in enumerate(found) if not any(_covers(other, facet) for other in found[:n])]
-    return [(f"contour-{number}", facet) for number, facet in enumerate(kept)]
+    return [(f"contour-{number}", facet) for number, facet in enumerate(kept)], columns
 
 
 def _covers(longer: Floats, facet: Floats) -> bool:

@@ -7,11 +7,11 @@ Bytes = NDArray[np.uint8]
 Bools = NDArray[np.bool_]
 Singles = NDArray[np.float32]
 
-PLAIN, STROKE = 176, 164  # grey values of what no picture shows
-_STRIPE = 12  # texels from one stroke to the next
+_GREY, _GREYED = 168.0, 0.6  # what no picture shows is this far on the way to this grey,
+_STROKE, _STRIPE = 12.0, 12  # with strokes that are darker, so many texels apart
 
 
-def fill(image: Bytes, seen: Bools, reach: int) -> Bytes:
+def fill(image: Bytes, seen: Bools, reach: int, like: NDArray[np.float64] | None = None) -> Bytes:
     """Fill the holes of a texture.
 
     Parameters
@@ -20,7 +20,9 @@ def fill(image: Bytes, seen: Bools, reach: int) -> Bytes:
     seen : ndarray of bool, shape (rows, columns)
         Which texels have a colour.
     reach : int
-        How many texels from the nearest colour are still filled.
+        How many texels from the nearest colour are still filled from there.
+    like : ndarray, shape (3,), optional
+        Colour of what is not seen, where nothing at all is; it stays free of strokes.
 
     Returns
     -------
@@ -30,16 +32,25 @@ def fill(image: Bytes, seen: Bools, reach: int) -> Bytes:
 
     if seen.all():
         return image
-    rows, columns = np.indices(seen.shape)
-    plain = np.where(np.asarray((rows + columns) % _STRIPE < 2)[..., None], STROKE, PLAIN).astype(np.uint8)
-    out = np.broadcast_to(plain, image.shape).copy()
-    out[seen] = image[seen]
     if not seen.any():
-        return out
-    away = cv2.distanceTransform((~seen).astype(np.uint8), cv2.DIST_L2, 3)
+        plain = np.full(3, _GREY) if like is None else like
+        base = np.broadcast_to(plain, image.shape).astype(np.float32)
+        return _hatched(base) if like is None else np.asarray(base, np.uint8)
+    spread = _spread(cv2, image, seen)
+    mean = image[seen].mean(axis=0)
+    out = _hatched(0.5 * (1.0 - _GREYED) * (spread.astype(np.float32) + mean) + _GREYED * _GREY)
+    away = np.asarray(cv2.distanceTransform((~seen).astype(np.uint8), cv2.DIST_L2, 3))
     close = ~seen & (away <= reach)
-    out[close] = _spread(cv2, image, seen)[close]
+    out[close] = spread[close]
+    out[seen] = image[seen]
     return out
+
+
+def _hatched(base: Singles) -> Bytes:
+    """Draw strokes."""
+    rows, columns = np.indices(base.shape[:2])
+    stroke = np.asarray((rows + columns) % _STRIPE < 2)[..., None]
+    return np.asarray(np.clip(base - _STROKE * stroke, 0.0, 255.0), np.uint8)
 
 
 def _spread(cv2: object, image: Bytes, seen: Bools) -> Bytes:

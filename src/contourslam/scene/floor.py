@@ -43,7 +43,7 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
     if not len(places):
         return ()
     angles = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
-    rings = [_sights(place, angles, blocks, reach) for place in places]
+    rings = [sights(place, angles, blocks, reach) for place in places]
     low = np.min([ring.min(axis=0) for ring in rings], axis=0)
     size = np.max([ring.max(axis=0) for ring in rings], axis=0) - low
     columns, rows = (int(n) for n in np.ceil(size / cell) + 1)
@@ -68,7 +68,7 @@ def _piece(part: Bools, corner: Floats, cell: float, number: int) -> Surface:
     x, y = np.eye(3)[:2]
     rows, columns = part.shape
     origin = np.append(corner, 0.0)
-    return Surface(f"floor-{number}", "floor", origin, x, y, columns * cell, rows * cell, cell * _rectangles(part))
+    return Surface(f"floor-{number}", "floor", origin, x, y, columns * cell, rows * cell, cell * rectangles(part))
 
 
 def _thinned(places: Floats) -> Floats:
@@ -81,7 +81,7 @@ def _thinned(places: Floats) -> Floats:
 
 
 @kernel
-def _sights(eye: Floats, angles: Floats, blocks: Floats, reach: float) -> Floats:
+def sights(eye: Floats, angles: Floats, blocks: Floats, reach: float) -> Floats:
     """Where rays in the plane end, shape (n, 2); a ray that meets nothing ends halfway out."""
     ring = np.empty((angles.size, 2))
     for n in range(angles.size):
@@ -110,7 +110,7 @@ def _largest(cv2: Any, seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(good[labels])
 
 
-def _rectangles(part: Bools) -> Floats:
+def rectangles(part: Bools) -> Floats:
     """Cover the cells with few rectangles: runs of a row, drawn up as long as the next row has the same run.
 
     Returns

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.kernels import kernel
-from contourslam.scene.surface import SIDE, Surface, TexelGrid
+from contourslam.scene.bodies import bodies
+from contourslam.scene.surface import SIDE, TexelGrid
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -21,7 +22,8 @@ _KNOWN = 0.4  # of the width that must be known to tell
 _FEW, _NONE = 0.2, 0.1  # of the width that disagrees below an edge at the most, and where there is none
 _ABOVE, _ALL_ABOVE = 0.75, 0.85  # of the width that disagrees just above an edge, and all the way up
 _LOWEST = 0.15  # m
-_CONVEX, _MEETS = 0.2, 0.12  # sine of the turn, m
+_BOX = 4  # sides
+_ABOVE_EDGE = 0.02  # m by which edges are found too high: small shifts count as agreement
 
 
 def disagreement(grid: TexelGrid, texel: float, colours: Bytes, weights: Bytes, factors: Singles) -> Singles:
@@ -116,26 +118,17 @@ def find_heights(grid: TexelGrid, differences: Singles) -> list[float | None]:
         None if s.kind == "floor" else _height(grid.image(index, differences)[::-1], s.height)
         for index, s in enumerate(grid.surfaces)
     ]
-    for group in _bodies(grid.surfaces):
-        told = [(grid.surfaces[n].width, heights[n]) for n in group if heights[n] is not None]
+    for group in bodies(grid.surfaces):
+        told = sorted((h, grid.surfaces[n].width) for n in group if (h := heights[n]) is not None)
+        edges = [(h, width) for h, width in told if h < max(grid.surfaces[n].height for n in group)]
+        if sum(width for _, width in edges) >= 0.5 * sum(width for _, width in told):
+            told = edges  # an edge that is seen says more than none that is seen
         if told:
-            mean = max(told)[1]
-            for n in group:
-                heights[n] = mean if heights[n] is None else heights[n]
+            half = np.searchsorted(np.cumsum([width for _, width in told]), 0.5 * sum(width for _, width in told))
+            for n in group:  # the sides of a round column are too narrow to tell each for itself
+                if heights[n] not in [h for h, _ in told] or len(group) > _BOX:
+                    heights[n] = told[int(half)][0]
     return heights
-
-
-def _bodies(surfaces: tuple[Surface, ...]) -> list[list[int]]:
-    """Surfaces that meet in corners around matter: the sides of one thing."""
-    group = list(range(len(surfaces)))
-    upright = [n for n in group if surfaces[n].kind != "floor"]
-    for a in upright:
-        for b in upright:
-            first, second = surfaces[a], surfaces[b]
-            turn = first.across[0] * second.across[1] - first.across[1] * second.across[0]
-            if turn > _CONVEX and np.hypot(*(first.segment[1] - second.segment[0])) < _MEETS:
-                group = [group[a] if number == group[b] else number for number in group]
-    return [[n for n in upright if group[n] == number] for number in sorted(set(group))]
 
 
 def _height(image: Singles, top: float) -> float | None:
@@ -159,7 +152,7 @@ def _height(image: Singles, top: float) -> float | None:
         if best is None or step > best[0]:
             best = step, at * row
     if best is not None:
-        return best[1]
+        return best[1] - _ABOVE_EDGE
     whole = differ.over(round(0.3 * len(image)), len(image))
     return top if whole.known > _KNOWN and whole.share < _NONE and whole.mean < 0.4 * _DIFFERENT else None
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.kernels import kernel
-from contourslam.scene.surface import Surface
+from contourslam.scene.surface import FLAT, Surface
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ def occluders(surfaces: tuple[Surface, ...]) -> Floats:
     ndarray, shape (n, 5)
         x, y of both ends of the lower edge and the height of the upper one, m.
     """
-    rows = [[*s.segment.ravel(), s.origin[2] + s.height] for s in surfaces if s.kind != "floor"]
+    rows = [[*s.segment.ravel(), s.origin[2] + s.height] for s in surfaces if s.kind not in FLAT]
     return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
 

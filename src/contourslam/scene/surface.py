@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+FLAT = ("floor", "top")
+"""Kinds of surfaces that lie."""
 T = TypeVar("T", bound=np.generic)
 SIDE = 8
 """Texels along each side of a cell: for a whole cell the same pictures are chosen."""
@@ -22,7 +24,7 @@ class Surface:
     name : str
         "wall-12" for wall 12 of the map, "contour-3" for what contours show beside the walls, "floor-0".
     kind : str
-        "wall", "contour" or "floor".
+        "wall", "contour", "behind" (a wall hidden by furniture), "top" (of furniture) or "floor".
     origin : ndarray, shape (3,)
         Its lower left corner as its viewer sees it, world frame with z up, m.
     across, up : ndarray, shape (3,)
