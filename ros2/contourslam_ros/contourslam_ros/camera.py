@@ -82,7 +82,6 @@ class Camera(DeviceNode):
                 f"the pictures have {size[0]} by {size[1]} pixels, and the lens was calibrated with {model.width} by "
                 f"{model.height}: choose a camera that gives these, or calibrate it anew"
             )
-            self.get_logger().error(self._refused, throttle_duration_sec=30.0)
             return
         self._refused = ""
         self._pictures.publish(picture_message(picture, self._frame))

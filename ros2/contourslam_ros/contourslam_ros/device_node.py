@@ -48,7 +48,7 @@ class DeviceNode(Node):
         self.failure: BaseException | None = None
         self.trouble = self.unanswered = f"the {part} has not answered yet"
         self._called = part
-        self._logged, self._logged_at = "", 0.0
+        self._logged, self._logged_at, self._ill = "", 0.0, False
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name=part, daemon=True)
 
@@ -96,7 +96,8 @@ class DeviceNode(Node):
             except DeviceError as error:
                 if not self.trouble:  # it worked until now
                     pause = FIRST_PAUSE
-                self._tell(str(error))
+                # A driver that has no patience gives up for a reason, which says more.
+                self._tell(str(error.__cause__ if isinstance(error.__cause__, DeviceError) else error))
             except Exception as error:  # the node's main thread ends with it
                 self.failure = error
                 return
@@ -112,5 +113,9 @@ class DeviceNode(Node):
 
     def _send_diagnostics(self) -> None:
         told = (Diagnostic(Level.ERROR, self._called, self.trouble),) if self.trouble else self.diagnostics()
+        worst = max(told, key=lambda one: one.level)
+        if worst.level > Level.OK and not (self._ill or self.trouble):  # once, for its figures change each second
+            self.get_logger().warning(worst.message)
+        self._ill = worst.level > Level.OK
         head = header(self.get_clock().now().to_msg(), "")
         self._diagnostics.publish(diagnostic_message(head, self.get_fully_qualified_name(), told))
