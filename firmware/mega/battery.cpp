@@ -9,6 +9,8 @@ constexpr float PER_COUNT = BATTERY_REFERENCE_MV / 1024.0f * BATTERY_DIVIDER;
 constexpr float SMOOTHING = 0.05f;    // of 5 ms: settles in 100 ms
 constexpr uint16_t LOW_AFTER = 200;   // periods: 1 s, for motors starting pull it down a moment
 
+static_assert(BATTERY_PIN >= 0 && BATTERY_PIN <= 7, "one of A0 to A7");
+
 float mean = -1;
 uint16_t low_for;
 
@@ -16,8 +18,8 @@ uint16_t low_for;
 
 void begin() {
   if (!BATTERY_WIRED) return;
-  ADMUX = _BV(REFS0) | (BATTERY_PIN & 7);  // 5 V
-  ADCSRB = BATTERY_PIN > 7 ? _BV(MUX5) : 0;
+  ADMUX = _BV(REFS0) | BATTERY_PIN;  // against 5 V
+  ADCSRB = 0;
   ADCSRA = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);
   ADCSRA |= _BV(ADSC);
 }

@@ -1,6 +1,8 @@
 """A bench for the board: a computer's end of the line, and motors."""
 
 import math
+import re
+import subprocess
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +13,7 @@ from contourslam.robot.base.protocol import Decoder, Received, cobs_encode, enco
 from contourslam.simulation.hardware.board import AT_REST, BoardStep, SimulatedBoard
 
 MEGA = Path(__file__).parents[1]
-BOARD = MEGA / "build" / "board"
-FIRMWARE = MEGA / "build" / "mega.elf"
+BUILD = MEGA / "build"
 
 
 def framed(kind: int, sequence: int, payload: bytes) -> bytes:
@@ -21,11 +22,24 @@ def framed(kind: int, sequence: int, payload: bytes) -> bytes:
     return cobs_encode(body + zlib.crc32(body).to_bytes(4, "little")) + b"\0"
 
 
+def build_for(folder: Path, **values: float) -> Path:
+    """Build firmware and board for another robot: values of config.h; where they are."""
+    text = (MEGA / "config.h").read_text()
+    for name, value in values.items():
+        text, count = re.subn(rf"(?m)^#define {name} [^\s]+", f"#define {name} {value}", text)
+        assert count == 1
+    config = folder / "robot.h"
+    config.write_text(text)
+    command = ["make", "-s", "-C", str(MEGA), f"BUILD={folder}", f"CONFIG={config}", "all", "board"]
+    subprocess.run(command, check=True, capture_output=True)
+    return folder
+
+
 class Bench:
     """A board, the wheels' positions, and all that was said, as messages with the time of the step they came in."""
 
-    def __init__(self, *options: str, firmware: Path = FIRMWARE) -> None:
-        self.board = SimulatedBoard(BOARD, firmware, options)
+    def __init__(self, *options: str, build: Path = BUILD) -> None:
+        self.board = SimulatedBoard(build / "board", build / "mega.elf", options)
         self.decoder = Decoder()
         self.heard: list[tuple[float, Received]] = []
         self.time = 0.0

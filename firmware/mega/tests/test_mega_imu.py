@@ -1,10 +1,8 @@
-import subprocess
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
-from mega_bench import MEGA, Bench
+from mega_bench import Bench
 
 from contourslam.robot.base.messages import COMPASS, IMU, Hello, HelloReply, State
 
@@ -67,24 +65,6 @@ def test_a_reading_that_does_not_fit_is_the_largest_that_does(shared: Bench) -> 
     assert state.gyro[1] <= -32700
     assert state.accel[:2] == pytest.approx((32767, -32768), abs=2)
     assert state.compass[0] > 32000
-
-
-@pytest.fixture(scope="module")
-def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Firmware for an IMU with its x to the right, its y up and its z to the back of the robot."""
-    build = tmp_path_factory.mktemp("turned")
-    flags = "-DIMU_AHEAD=-3 -DIMU_LEFT=-1 -DIMU_UP=2 -DBATTERY_WIRED=0"
-    subprocess.run(["make", "-s", "-C", MEGA, f"BUILD={build}", f"FLAGS={flags}"], check=True, capture_output=True)
-    return build / "mega.elf"
-
-
-def test_an_imu_mounted_otherwise_comes_through_in_the_base_frame(bench: Callable[..., Bench], turned: Path) -> None:
-    mega = bench("--imu-axes", "-3,-1,2", firmware=turned)
-    mega.run(FOUND)
-    for reading in READINGS:
-        mega.imu = reading
-        assert np.all(np.abs(nine(settle(mega)) - reading) <= TOLERANCES)
-    assert mega.state().battery_mv == 0
 
 
 def test_an_imu_mounted_otherwise_than_configured_is_seen_so(bench: Callable[..., Bench]) -> None:

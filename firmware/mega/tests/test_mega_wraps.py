@@ -5,7 +5,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
-from mega_bench import FIRMWARE, Bench, Motor
+from mega_bench import BUILD, Bench, Motor
 
 from contourslam.robot.base.messages import Drive
 
@@ -14,7 +14,7 @@ STEP = 0.001
 
 def address(name: str) -> int:
     """Where the firmware keeps a variable."""
-    listing = subprocess.run(["avr-nm", FIRMWARE], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(["avr-nm", BUILD / "mega.elf"], capture_output=True, text=True, check=True).stdout
     (found,) = [line.split()[0] for line in listing.splitlines() if name in line]
     return int(found, 16) & 0xFFFF
 
