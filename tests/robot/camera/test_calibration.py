@@ -27,8 +27,8 @@ def png(pixels: np.ndarray) -> Picture:
 
 @pytest.fixture(scope="module")
 def done() -> PicturesCalibrated:
-    """14 pictures of a board, one without it, one damaged, one that shows what another did."""
-    places = boards_around(CORNERS, BOARD.square, 14, seed=3)
+    """12 pictures of a board, one without it, one damaged, one that shows what another did."""
+    places = boards_around(CORNERS, BOARD.square, 12, seed=3)
     pictures = [
         (f"{i:02}", png(render_board(LENS, CORNERS, BOARD.square, T, seed=i, samples=2))) for i, T in enumerate(places)
     ]
@@ -55,7 +55,7 @@ def ray_errors_deg(lens: PolynomialLens, model: FisheyeModel) -> np.ndarray:
 def test_reprojection_is_below_half_a_pixel_out_to_100_degrees(done: PicturesCalibrated) -> None:
     found = done.calibration
     used = [view for view in found.views if view.used]
-    assert len(used) >= 13
+    assert len(used) >= 11
     assert found.rms < 0.15 and max(view.rms for view in used) < 0.5
     assert max(view.angles_deg[1] for view in used) > 100.0
     assert sum(found.ring_corners) == len(used) * 54 and found.ring_corners[10] > 0
@@ -66,7 +66,7 @@ def test_every_ray_is_within_half_a_degree_of_the_true_one(done: PicturesCalibra
 
 
 def test_boards_are_placed_where_they_were(done: PicturesCalibrated) -> None:
-    places = boards_around(CORNERS, BOARD.square, 14, seed=3)
+    places = boards_around(CORNERS, BOARD.square, 12, seed=3)
     for view in done.calibration.views:
         true = places[int(view.name)]
         found, wanted = ((T @ np.append(BOARD.middle, 1.0))[:3] for T in (view.T_camera_board, true))
@@ -90,7 +90,7 @@ def exact_views(lens: PolynomialLens, count: int, noise: float, seed: int = 0, *
 
 
 @pytest.mark.parametrize("lens", [LENS, STEREOGRAPHIC], ids=["equal-area", "stereographic"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_start_is_good_enough_for_any_lens(lens: PolynomialLens, seed: int) -> None:
     found = calibrate(lens.width, lens.height, BOARD, exact_views(lens, 12, 0.1, seed))
     assert found.rms < 0.25
@@ -98,10 +98,10 @@ def test_the_start_is_good_enough_for_any_lens(lens: PolynomialLens, seed: int) 
 
 
 def test_the_uncertainty_told_is_that_of_repeated_calibrations() -> None:
-    """The spread over 6 noises of one ray at 60 degrees."""
+    """The spread over 5 noises of one ray at 60 degrees."""
     rays, told = [], []
     exact = exact_views(LENS, 10, 0.0)
-    for seed in range(6):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         views = [View(v.name, v.corners + rng.normal(0.0, 0.5, v.corners.shape)) for v in exact]
         found = calibrate(LENS.width, LENS.height, BOARD, views)
@@ -125,7 +125,7 @@ def test_a_view_that_is_far_off_is_left_out_and_named() -> None:
 def test_thin_coverage_is_told() -> None:
     near_the_axis = calibrate(LENS.width, LENS.height, BOARD, exact_views(LENS, 14, 0.1, farthest_deg=60.0))
     assert any("no corner was seen farther than" in text for text in near_the_axis.warnings)
-    right_only = [v for v in exact_views(LENS, 60, 0.1) if v.corners[:, 0].mean() > LENS.cx - 20.0]
+    right_only = [v for v in exact_views(LENS, 36, 0.1) if v.corners[:, 0].mean() > LENS.cx - 20.0]
     found = calibrate(LENS.width, LENS.height, BOARD, right_only)
     assert any("the left of the picture" in text for text in found.warnings)
     few = calibrate(LENS.width, LENS.height, BOARD, exact_views(LENS, 6, 0.1))

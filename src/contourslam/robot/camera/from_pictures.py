@@ -17,6 +17,7 @@ from contourslam.robot.camera.opencv import decode
 from contourslam.robot.camera.start import rough_lens
 
 _MOVED = 0.02  # of the size at which a board is seen: one that moved by less tells nothing new
+_ALIKE = 0.12  # of the distance from the axis: by so much a lens may be off, and its flat views still be flat enough
 
 
 @dataclass(frozen=True)
@@ -102,12 +103,24 @@ def _again(
         model = calibrate(rough.width, rough.height, board, views, field_of_view_deg=rough.field_of_view_deg).model
     except ContourslamError:  # too few or too odd: the same pictures fail again at the end, with a reason
         return views, missed
+    if _alike(model, rough):
+        return views, missed
     still: list[tuple[str, Picture]] = []
     for name, picture in missed:
         grey = decode(picture, grey=True)
         if grey is not None:
             _take(views, still, repeated, name, picture, find_corners(grey, board, model))
     return views, still
+
+
+def _alike(model: FisheyeModel, rough: FisheyeModel) -> bool:
+    """Whether the flat views that a picture is searched in would look about the same by both lenses."""
+    angles, around = np.meshgrid(np.linspace(0.2, 0.95, 6) * rough.half_view, np.linspace(0.0, 2.0 * math.pi, 9)[:-1])
+    across = np.sin(angles.ravel())
+    rays = np.column_stack([across * np.cos(around.ravel()), across * np.sin(around.ravel()), np.cos(angles.ravel())])
+    one, other = model.project(rays)[0], rough.project(rays)[0]
+    radius = np.linalg.norm(one - (model.cx, model.cy), axis=1)
+    return bool((np.linalg.norm(one - other, axis=1) < _ALIKE * radius).all())
 
 
 def _take(

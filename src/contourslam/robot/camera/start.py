@@ -21,7 +21,7 @@ _CURVES: tuple[Callable[[Floats], Floats], ...] = (
     lambda angle: 2.0 * np.sin(0.5 * angle),
     lambda angle: 2.0 * np.tan(0.5 * angle),
 )
-_SCALES, _SOME = 14, 8  # of a lens that are tried, and views that they are tried on
+_SCALES, _SOME = 12, 6  # of a lens that are tried, and views that they are tried on
 _XI = 1.6  # with it and two terms of distortion the unified model follows all of them
 
 
