@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ros firmware test-firmware bench bench-scale bench-ros check clean
+.PHONY: help demo test test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -33,6 +33,9 @@ firmware: ## Build the Mega's firmware and the simulated board that runs it (nee
 test-firmware: $(VENV)/.dev firmware ## Run the firmware's tests on the simulated board; minutes.
 	$(BIN)/python -m pytest -n auto --dist worksteal firmware/mega/tests
 
+robot-in-the-loop: $(VENV)/.all firmware ## Let the whole robot drive against simulated devices, at real time; report in robot-in-the-loop/ (two minutes).
+	$(BIN)/contourslam robot-in-the-loop --output robot-in-the-loop --overwrite --record
+
 check: $(VENV)/.dev ## Lint, check the format and the types.
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -47,8 +50,11 @@ bench-scale: $(VENV)/.dev ## Measure time, memory and error against distance in 
 bench-ros: $(VENV_ROS)/.ready ## Measure the ROS 2 node beside a robot that is played in real time; two minutes.
 	$(VENV_ROS)/bin/python benchmarks/bench_ros.py --write
 
+bench-robot: $(VENV)/.dev firmware ## Measure the robot in the loop over five seeds with and without faults; half an hour on a quiet machine.
+	$(BIN)/python benchmarks/bench_robot.py --write
+
 clean: ## Remove everything that the other targets made, .venv included.
-	rm -rf $(VENV) $(VENV_ROS) .venv-peers firmware/mega/build demo out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV_ROS) .venv-peers firmware/mega/build demo robot-in-the-loop out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find src tests tests_ros ros2 firmware examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

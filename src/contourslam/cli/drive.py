@@ -12,7 +12,7 @@ from contourslam.cli.console import make_way, note, prepare_folder, print_json
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Patience, Settings
 from contourslam.cli.run import DEFAULTS
-from contourslam.config import Config, LiveConfig
+from contourslam.config import Config
 from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Drive:
         from contourslam.robot.bring_up import Robot, openers
         from contourslam.robot.config import RobotConfig, load_robot
         from contourslam.robot.journey import Journey
-        from contourslam.robot.live_map import LiveMap, settings_of
+        from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
 
         self._check()
         config = RobotConfig() if self.robot is None else load_robot(self.robot)
@@ -80,9 +80,8 @@ class Drive:
             interrupt = stack.enter_context(Interrupt())
             robot = stack.enter_context(Robot(openers(config, patience=self.patience, rate=self.picture_rate)))
             events = robot.wait_until_ready(interrupt.or_after(None))
-            live = LiveConfig(wait=0.6, max_waiting=10)
             autosave = self.output / "map.cmap"
-            live_map = LiveMap(settings, live, lidar_mount=config.lidar.mount, autosave=autosave)
+            live_map = LiveMap(settings, PATIENT, lidar_mount=config.lidar.mount, autosave=autosave)
             stack.callback(live_map.close)
             camera = None if config.camera is None else (config.camera.model, config.camera.T_base_camera)
             writer = stack.enter_context(

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.config import Config, LiveConfig, SlamConfig
+from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError
 from contourslam.evaluation.errors import rmse
 from contourslam.geometry.poses import interpolate
@@ -24,7 +24,7 @@ from contourslam.robot.bring_up import Event, Openers, Robot, Trouble, openers
 from contourslam.robot.config import BaseConfig, CameraPart, LidarPart, RobotConfig
 from contourslam.robot.journey import Journey, Sight, Twist
 from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
-from contourslam.robot.live_map import LiveMap, settings_of
+from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
 from contourslam.robot.pilot import Pilot, PilotConfig
 from contourslam.robot.route import sample_route
 from contourslam.simulation.config import YDLIDAR_X4, CameraModel, RobotModel
@@ -50,8 +50,6 @@ DAMAGE = Damage(0.05)
 """Each byte on its own, which is harder on packets than bursts."""
 STANDS = 2.0
 """The robot stands for this long at first, s: the gyroscope's bias is found, and the map begins."""
-LIVE = LiveConfig(wait=0.6, max_waiting=10)
-"""Where nine of ten frames of the base are damaged, odometry comes a few times a second; a scan waits for it."""
 SETTINGS = Config(slam=SlamConfig(walls=True, contour_matching=True), back_end="graph")
 
 
@@ -290,7 +288,7 @@ def _drive(
         if isinstance(event, Picture):
             pictures.append(event)
 
-    live_map = LiveMap(settings, LIVE, lidar_mount=parts.lidar.mount, initial_pose=np.array(world.start))
+    live_map = LiveMap(settings, PATIENT, lidar_mount=parts.lidar.mount, initial_pose=np.array(world.start))
     stack.callback(live_map.close)
     pilot = Pilot(
         sample_route(ROOMS[config.room].route), closed=True, config=PilotConfig(speed=config.speed, blind_time=4.0)

@@ -5,10 +5,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from contourslam.errors import RecordingError
-from contourslam.recordings.base_readings import WheelReading
+from contourslam.recordings.base_readings import BaseReading
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.writer import RecordingWriter
+from contourslam.robot.base.odometry import arc
 from contourslam.robot.base.states import BaseState
 from contourslam.robot.bring_up import Event, Robot, Stopped, Trouble
 from contourslam.robot.lidar.even_beams import even_beams
@@ -17,6 +20,8 @@ from contourslam.scan import LaserScan, Odometry
 
 CONTROL = 0.02
 """Between two commands to the base, s."""
+_SECTOR_DEG, _SECTORS = 10.0, 12  # so many sectors with something in them make a scan that is mapped
+_SILENT = 1.0  # s without a word of the base, after which nobody knows where the robot is now
 _LEAST_BEAMS = 3  # a scan of fewer, as a damaged line leaves, cannot be put on even beams
 Twist = tuple[float, float]
 Steer = Callable[["Sight", float], Twist]
@@ -30,7 +35,8 @@ class Sight:
     Attributes
     ----------
     pose : tuple of (float, float, float), or None
-        m, m, rad in the map; None where it does not know.
+        m, m, rad in the map, now: from the last word of the base on as it moved then; None where it does not know, or
+        the base has been silent for too long.
     sigma : float
         Standard deviation of its position at the last scan, m.
     blind : float
@@ -40,6 +46,13 @@ class Sight:
     pose: tuple[float, float, float] | None
     sigma: float
     blind: float
+
+
+def looks_around(scan: LaserScan) -> bool:
+    """Whether a scan sees enough of the surroundings to be of use; on a damaged line some turns are nearly empty."""
+    with np.errstate(invalid="ignore"):
+        hits = (scan.ranges >= scan.range_min) & (scan.ranges < scan.range_max)
+    return len(np.unique(np.floor(np.degrees(scan.angles[hits]) / _SECTOR_DEG))) >= _SECTORS
 
 
 class Journey:
@@ -74,6 +87,7 @@ class Journey:
         self.troubles: list[Trouble] = []
         self.scans = self.states = self.pictures = 0
         self._scanned = time.monotonic()
+        self._state: BaseState | None = None
 
     def go(self, steer: Steer, stopped: Stopped) -> None:
         """Drive until told to stop; the motors are off afterwards.
@@ -102,20 +116,35 @@ class Journey:
         last = self._map.last
         sigma = 0.0 if last is None else math.sqrt(max(float(last.covariance[0, 0] + last.covariance[1, 1]), 0.0))
         localized = last is not None and last.localized
-        return Sight(self._map.pose() if localized else None, sigma, time.monotonic() - self._scanned)
+        return Sight(self._pose_now() if localized else None, sigma, time.monotonic() - self._scanned)
+
+    def _pose_now(self) -> tuple[float, float, float] | None:
+        pose, state = self._map.pose(), self._state
+        if pose is None or state is None:
+            return None
+        age = max(time.time() - state.stamp, 0.0)
+        if age > _SILENT:
+            return None
+        way = arc(np.array(pose), state.odometry.speed * age, 0.0, state.odometry.turn_rate * age)
+        x, y, heading = way.tolist()
+        return x, y, heading
 
     def take(self, event: Event) -> None:
         """Take in an event."""
         if isinstance(event, LaserScan):
-            self.scans, self._scanned = self.scans + 1, time.monotonic()
-            self._map.push(event)
+            self.scans += 1
+            if looks_around(event):
+                self._scanned = time.monotonic()
+                self._map.push(event)
             self._record(even_beams(event))
         elif isinstance(event, BaseState):
-            self.states += 1
+            self.states, self._state = self.states + 1, event
             reading = event.odometry.reading()
             self._map.push(reading)
             self._record(reading)
             self._record(event.wheels())
+            if (inertial := event.inertial()) is not None:
+                self._record(inertial)
         elif isinstance(event, Picture):
             self.pictures += 1
             self._record(event)
@@ -123,7 +152,7 @@ class Journey:
             self.troubles.append(event)
         self._watch(event)
 
-    def _record(self, message: LaserScan | Odometry | Picture | WheelReading) -> None:
+    def _record(self, message: LaserScan | Odometry | Picture | BaseReading) -> None:
         """Record a message; a recording that fails ends, and the drive goes on."""
         if self._writer is None or (isinstance(message, LaserScan) and message.ranges.size < _LEAST_BEAMS):
             return

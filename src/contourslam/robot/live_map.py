@@ -25,6 +25,10 @@ _TURN_PER_M_DEG, _TURN_PER_RAD_DEG = 0.3, 0.6  # of a gyroscope whose bias was f
 _LEAST_LATERAL = 0.003  # m after one metre
 _CLOCK = 0.003  # s by which the stamps of lidar and base may differ
 
+PATIENT = LiveConfig(wait=1.5, silent_after=3.0, max_waiting=20)
+"""Over a line that damages nine of ten frames the odometry comes a few times a second: scans wait for it, for a scan
+without it is mapped by a guess. On a good line it is there at once."""
+
 
 def settings_of(robot: RobotConfig, config: Config) -> Config:
     """Tell the mapping what is known of the robot: the lidar's place and range, and how good its wheels are.
