@@ -36,7 +36,8 @@ COMMANDS = {
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""
 
-_LIST = "\n".join(f"  {name:<10}{summary}" for name, summary in COMMANDS.items())
+_WIDTH = max(map(len, COMMANDS)) + 1
+_LIST = "\n".join(f"  {name:<{_WIDTH}}{summary}" for name, summary in COMMANDS.items())
 HELP = f"""usage: contourslam COMMAND ...
 
 Map a building as corners and walls from any 2-D lidar, and compare landmark detectors.
