@@ -177,7 +177,9 @@ class FisheyeModel:
     def _undistort(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         _, plane, radii = self._radii
         radius = np.hypot(x, y)
-        start = np.interp(radius, radii, plane) / np.maximum(radius, 1e-300)
+        # What lies farther out than any ray of the lens is left alone: there the steps would not settle.
+        start = np.interp(radius, radii, plane, right=np.nan) / np.maximum(radius, 1e-300)
+        start = np.where((radius > radii[-1]) & (radius < 1.02 * radii[-1]), plane[-1] / radii[-1], start)
         u, v = start * x, start * y
         for _ in range(_STEPS):
             off_x, off_y = self._distort(u, v)
