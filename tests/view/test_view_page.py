@@ -69,8 +69,7 @@ def inked(page, lane: int = 0) -> int:
 def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened) -> None:
     _, server = served(40)
     page = opened(server)
-    wait(page, f"{STATE} === 'finished' && contourslam.model.frame?.index === 39 && contourslam.model.maps[0]")
-    wait(page, "contourslam.model.status.lag.median !== null")
+    wait(page, f"{STATE} === 'finished' && contourslam.drawn === 39 && contourslam.model.maps[0]")
     assert inked(page) > 10
     assert page.inner_text("#state") == "mapped to the end"
     assert "circle" in page.inner_text("#title")
@@ -96,10 +95,7 @@ def test_four_detectors_stand_side_by_side(served, opened) -> None:
     names = ("matched_filter", "wu", "teh_chin", "curvature_scale_space")
     _, server = served(20, names)
     page = opened(server)
-    wait(
-        page, f"{STATE} === 'finished' && contourslam.model.frame?.index === 19 && contourslam.model.maps.length === 4"
-    )
-    wait(page, "contourslam.model.status.lag.median !== null")
+    wait(page, f"{STATE} === 'finished' && contourslam.drawn === 19 && contourslam.model.maps.length === 4")
     boxes = [page.locator("figure.lane").nth(i).bounding_box() for i in range(4)]
     assert len({(box["x"], box["y"]) for box in boxes}) == 4
     assert [text.split("\n")[0] for text in page.locator("figcaption").all_inner_texts()] == [

@@ -18,7 +18,10 @@ from contourslam.view.wire import pack
 
 PERIOD = 1.0 / 30.0  # s between two frames
 STATUS, STORY = 0.25, 1.0  # s
-UNDRAWN = 2  # frames that may be on their way; further ones wait, and only the newest of them is ever sent
+# Frames that may be on their way, to a page that draws fast and to one that does not; further ones wait, and only the
+# newest of them is ever sent.
+UNDRAWN, UNDRAWN_SLOW = 2, 1
+SLOW = 0.08  # s from sending to drawing
 SHARE = 0.03  # of one processor, no more, goes into a page while the mapping has no time to spare
 CHUNK = 300  # knots in one message
 
@@ -43,7 +46,8 @@ class Spectator:
         self._undrawn: deque[tuple[int, float, float | None]] = deque()  # frame, when sent, when its scan was done
         self._epoch, self._knots, self._events = -1, 0, 0
         self._maps: list[int] = []
-        self._index = -1
+        self._turn = 0.0  # s from sending to drawing, of late
+        self._index, self._began = -1, time.monotonic()
         self._status_at = self._story_at = 0.0
         self._story: tuple[int, int] | None = None
 
@@ -101,6 +105,7 @@ class Spectator:
         now = time.monotonic()
         while self._undrawn:
             frame, sent, made = self._undrawn.popleft()
+            self._turn += 0.2 * (now - sent - self._turn)
             if made is not None:
                 self._lag.count(now - sent, sent - made)
             if frame == index:
@@ -116,7 +121,7 @@ class Spectator:
         if now >= self._status_at + STATUS:
             self._status_at = now
             await self._send_status()
-        if len(self._undrawn) >= UNDRAWN:
+        if len(self._undrawn) >= (UNDRAWN if self._turn < SLOW else UNDRAWN_SLOW):
             return
         moment = self._cursor.moment()
         if moment is None:
@@ -143,8 +148,7 @@ class Spectator:
         knots = show.memory.knots_until(moment.index)
         message = show.painter.paint(moment, knots)
         self._index = moment.index
-        running = show.pace is None or not show.pace.paused
-        fresh = self._cursor.at is None and running
+        fresh = self._cursor.at is None and moment.made >= self._began  # else it has waited for the page to be opened
         self._undrawn.append((moment.index, time.monotonic(), moment.made if fresh else None))
         await self._connection.send(message)
 

@@ -9,7 +9,7 @@ import { drawPanels, drawStatus } from "./panels.js";
 import { Transport } from "./transport.js";
 
 const $ = (id) => document.getElementById(id);
-const PANELS = 120; // ms between two drawings of what stands beside the map
+const PANELS = 200; // ms between two drawings of what stands beside the map
 const store = {
   get: (key, otherwise) => { try { return localStorage.getItem(key) ?? otherwise; } catch { return otherwise; } },
   set: (key, value) => { try { localStorage.setItem(key, value); } catch { /* private windows have no store */ } },
@@ -18,7 +18,7 @@ const store = {
 const model = new Model();
 const camera = new Camera(() => { toolbar(); ask(); });
 const layers = Object.fromEntries(LAYERS.map(([key, , , on]) => [key, store.get(`layer.${key}`, String(on)) === "true"]));
-let maps = [], selected = null, undrawn = null, asked = false, panelsAt = 0, panelsWait = null, statusNew = false;
+let maps = [], selected = null, undrawn = null, drawn = null, asked = false, panelsAt = 0, panelsWait = null, statusNew = false;
 
 const link = new Link({
   message(message) {
@@ -92,6 +92,7 @@ function draw(now) {
   }
   if (undrawn !== null) {
     send("drawn", undrawn);
+    drawn = undrawn;
     undrawn = null;
   }
   if (moving) ask();
@@ -193,4 +194,4 @@ document.addEventListener("keydown", (event) => {
 });
 
 // For those who test the page.
-window.contourslam = { model, camera, link, get selected() { return selected; }, get maps() { return maps; } };
+window.contourslam = { model, camera, link, get drawn() { return drawn; }, get selected() { return selected; }, get maps() { return maps; } };

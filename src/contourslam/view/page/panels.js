@@ -1,7 +1,10 @@
 // The texts and charts beside the map.
 
-import { drawInnovations, drawLife, drawResponse, drawScan, drawSeries, minutes, smooth } from "./charts.js";
+import { minutes } from "./charts.js";
 import { laneColour, stageColour } from "./colours.js";
+import { drawInnovations, drawLife } from "./corner_chart.js";
+import { drawResponse, drawScan } from "./scan_chart.js";
+import { drawSeries, smooth } from "./series.js";
 
 const $ = (id) => document.getElementById(id);
 const LIMIT = 0.7; // false-negative rate beyond which a landmark is dropped
