@@ -51,13 +51,14 @@ class Salvage:
         step : float, optional
             Degrees between two samples, as of late; None where that is not known, and no damaged packet is trusted.
         """
-        counts, spans = packets.counts.tolist(), spans_deg(packets).tolist()
-        ends = np.cumsum(packets.counts).tolist()
-        for k, count in enumerate(counts):
-            now = Candidate(
-                bool(packets.sound[k]), bool(packets.starts[k]), float(packets.first_deg[k]), spans[k],
-                packets.raw[ends[k] - count : ends[k]], int(packets.begins[k]), int(packets.ends[k]),
-            )  # fmt: skip
+        at = 0
+        heads = zip(
+            packets.sound.tolist(), packets.starts.tolist(), packets.first_deg.tolist(), spans_deg(packets).tolist(),
+            packets.counts.tolist(), packets.begins.tolist(), packets.ends.tolist(), strict=True,
+        )  # fmt: skip
+        for sound, starts, first, span, count, begin, end in heads:
+            now = Candidate(sound, starts, first, span, packets.raw[at : at + count], begin, end)
+            at += count
             waited, self._waiting = self._waiting, None
             if waited is not None and step is not None:
                 if _joined(self._before, waited, step) and _joined(waited, now, step):

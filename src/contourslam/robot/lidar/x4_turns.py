@@ -144,11 +144,12 @@ class TurnAssembler:
             self._cut(starts, first, first + 0.5 * span, leapt, scans)
             # The packet's middle is what belongs to this turn; its first sample may lie a little before the start.
             base = (first - self._cut_at + 0.5 * span) % 360.0 - 0.5 * span
-            wrong = (raw & 3 != 0) & (self._whole_mm and (noisy or not packet.sound))
-            if not packet.sound:
+            doubtful = noisy or not packet.sound
+            wrong = raw & 3 != 0 if doubtful and self._whole_mm else None
+            if wrong is not None and not packet.sound:
                 raw = np.where(wrong, 0, raw).astype(np.uint16)
-            if not packet.sound or not wrong.any():
-                self._pieces.append(_Piece(base, span, raw, time, self._clock.period, noisy or not packet.sound))
+            if wrong is None or not packet.sound or not wrong.any():
+                self._pieces.append(_Piece(base, span, raw, time, self._clock.period, doubtful))
             self.samples += count
             if self.samples > MOST_BEAMS:
                 self.stalled += 1
@@ -166,7 +167,7 @@ class TurnAssembler:
             return False
         if len(self._steps) < 3:
             return 0.0 < span < 2.0 * (count - 1)
-        usual = float(np.median(self._steps)) * (count - 1)
+        usual = sorted(self._steps)[len(self._steps) // 2] * (count - 1)
         return abs(span - usual) < 0.1 * usual + 0.5
 
     def _lost(self, first: float) -> int:
