@@ -89,7 +89,7 @@ def _legs(first: Floats, second: Floats) -> list[Floats] | None:
     if abs(turn) < _TURN:
         off = abs(along[0] * gap[1] - along[1] * gap[0])
         return [np.stack([first[1], second[0]])] if off < _OFFSET and _SHORTEST < gap @ along < _LONGEST else None
-    if turn > -_CORNER:  # it would turn towards the viewer: furniture, not a corner of the room
+    if not _CORNER < -turn < math.pi - _CORNER:  # it would run back, or turn to the viewer: furniture, no corner
         return None
     across = along[0] * other[1] - along[1] * other[0]
     s = (gap[0] * other[1] - gap[1] * other[0]) / across

@@ -182,7 +182,7 @@ def cut_to_height(
     choice = choose(grid, views.chosen, lens, blocks, texel, lambda done: told(0.4 * done))
     samples = take(grid, choice, views.chosen, lens, blocks, texel, lambda done: told(0.4 + 0.6 * done))
     factors = solve_exposure(choice, samples, len(views.chosen)).factors(choice)
-    heights = find_heights(grid, disagreement(grid, texel, samples.colours, samples.weights, factors))
+    heights = find_heights(grid, *disagreement(grid, texel, samples.colours, samples.weights, factors))
     closed = walls_behind(looked_at, heights, poses)
     walls = [*whole_walls(looked_at, heights), *closed]
     cut = [s.cut(_settled(s, h, walls, options)) for s, h in zip(looked_at, heights, strict=True)]

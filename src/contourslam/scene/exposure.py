@@ -15,7 +15,7 @@ _ROUNDS = 4
 _KERNEL = 0.1  # of the Cauchy weights, in logarithms: what disagrees by more hardly counts
 _TEXELS = 8  # of a cell's texels that must be seen
 _PRIOR_GAIN, _PRIOR_LENS = 0.5, 0.3  # standard deviations of the unknowns, in logarithms
-_COMMON = 2.0  # cells: how strongly one cell binds, against the priors
+_COMMON = 0.02  # cells: how strongly one cell binds, against the priors
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from contourslam.kernels import kernel
 from contourslam.scene.bodies import bodies
-from contourslam.scene.surface import SIDE, TexelGrid
+from contourslam.scene.surface import SIDE, Surface, TexelGrid
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -22,11 +22,14 @@ _KNOWN = 0.4  # of the width that must be known to tell
 _FEW, _NONE = 0.2, 0.1  # of the width that disagrees below an edge at the most, and where there is none
 _ABOVE, _ALL_ABOVE = 0.75, 0.85  # of the width that disagrees just above an edge, and all the way up
 _LOWEST = 0.15  # m
-_BOX = 4  # sides
+_BOX, _APART = 4, 0.15  # sides; m, by which the sides of one thing may differ
+_ALIKE = 30.0  # of 255
 _ABOVE_EDGE = 0.02  # m by which edges are found too high: small shifts count as agreement
 
 
-def disagreement(grid: TexelGrid, texel: float, colours: Bytes, weights: Bytes, factors: Singles) -> Singles:
+def disagreement(
+    grid: TexelGrid, texel: float, colours: Bytes, weights: Bytes, factors: Singles
+) -> tuple[Singles, Singles]:
     """How far pictures differ on each texel, by more than a small shift of one of them explains.
 
     What counts is by how much a picture's colour leaves the range that the best picture shows nearby.
@@ -43,8 +46,10 @@ def disagreement(grid: TexelGrid, texel: float, colours: Bytes, weights: Bytes, 
 
     Returns
     -------
-    ndarray of float32, shape (cells, t)
+    differences : ndarray of float32, shape (cells, t)
         Of 255; NaN where fewer than three pictures show it.
+    best : ndarray of float32, shape (cells, t, 3)
+        The colours in the best picture of each.
     """
     import cv2
 
@@ -59,7 +64,7 @@ def disagreement(grid: TexelGrid, texel: float, colours: Bytes, weights: Bytes, 
             grid.put(index, out, np.asarray(extreme(image, nearby)))
     out = np.empty(weights.shape[:2], np.float32)
     _excess(colours, weights, factors, low, high, out)
-    return out
+    return out, best
 
 
 @kernel
@@ -99,13 +104,13 @@ def _excess(colours: Bytes, weights: Bytes, factors: Singles, low: Singles, high
             out[c, t] = summed / total if n >= _FEWEST and total > 0.0 else np.nan
 
 
-def find_heights(grid: TexelGrid, differences: Singles) -> list[float | None]:
+def find_heights(grid: TexelGrid, differences: Singles, best: Singles) -> list[float | None]:
     """Find the heights of upright surfaces that were coloured higher than they may be.
 
     Parameters
     ----------
     grid : TexelGrid
-    differences : ndarray of float32, shape (cells, t)
+    differences, best
         As from :func:`disagreement`.
 
     Returns
@@ -115,8 +120,8 @@ def find_heights(grid: TexelGrid, differences: Singles) -> list[float | None]:
         furniture is as high as the rest of it.
     """
     heights = [
-        None if s.kind == "floor" else _height(grid.image(index, differences)[::-1], s.height)
-        for index, s in enumerate(grid.surfaces)
+        None if s.kind == "floor" else _height(grid.image(n, differences)[::-1], grid.image(n, best)[::-1], s)
+        for n, s in enumerate(grid.surfaces)
     ]
     for group in bodies(grid.surfaces):
         told = sorted((h, grid.surfaces[n].width) for n in group if (h := heights[n]) is not None)
@@ -125,18 +130,20 @@ def find_heights(grid: TexelGrid, differences: Singles) -> list[float | None]:
             told = edges  # an edge that is seen says more than none that is seen
         if told:
             half = np.searchsorted(np.cumsum([width for _, width in told]), 0.5 * sum(width for _, width in told))
+            middle = told[int(half)][0]
             for n in group:  # the sides of a round column are too narrow to tell each for itself
-                if heights[n] not in [h for h, _ in told] or len(group) > _BOX:
-                    heights[n] = told[int(half)][0]
+                own = heights[n]
+                if own is None or abs(own - middle) > _APART or len(group) > _BOX:
+                    heights[n] = middle
     return heights
 
 
-def _height(image: Singles, top: float) -> float | None:
-    """Height at which disagreement begins over most of the width, or `top` where there is none at all, m.
+def _height(image: Singles, colours: Singles, surface: Surface) -> float | None:
+    """Height at which disagreement begins over most of the width, or the surface's own where there is none at all, m.
 
-    `image` has the lowest row first.
+    The images have the lowest row first.
     """
-    row = top / len(image)
+    row = surface.height / len(image)
     differ = _Columns(image)
     window = max(round(_WINDOW / row), 1)
     best: tuple[float, float] | None = None
@@ -145,7 +152,10 @@ def _height(image: Singles, top: float) -> float | None:
         below, all_below, above = parts
         if min(part.known for part in parts) < _KNOWN or max(below.share, all_below.share) > _FEW:
             continue
-        if above.share < _ABOVE or differ.over(at, len(image)).share < _ALL_ABOVE:
+        if above.share < _ABOVE:
+            continue
+        # A wall behind something looks as if it ended there, but farther up pictures agree again.
+        if surface.kind == "wall" and differ.over(at, len(image)).share < _ALL_ABOVE:
             continue
         edge = max(round(0.3 * _WINDOW / row), 1)
         step = differ.over(at, at + edge).mean - differ.over(at - edge, at).mean
@@ -154,7 +164,17 @@ def _height(image: Singles, top: float) -> float | None:
     if best is not None:
         return best[1] - _ABOVE_EDGE
     whole = differ.over(round(0.3 * len(image)), len(image))
-    return top if whole.known > _KNOWN and whole.share < _NONE and whole.mean < 0.4 * _DIFFERENT else None
+    agreed = whole.known > _KNOWN and whole.share < _NONE and whole.mean < 0.4 * _DIFFERENT
+    return surface.height if agreed and _all_one(image, colours) else None
+
+
+def _all_one(image: Singles, colours: Singles) -> bool:
+    """Whether the upper part of a surface is about as bright as its lower part: a plain ceiling agrees everywhere."""
+    third = max(len(image) // 3, 1)
+    parts = [colours[rows][np.isfinite(image[rows])] for rows in (slice(0, third), slice(-third, None))]
+    return all(len(part) for part in parts) and bool(
+        np.abs(parts[0].mean(axis=0) - parts[1].mean(axis=0)).mean() < _ALIKE
+    )
 
 
 @dataclass(frozen=True, slots=True)
