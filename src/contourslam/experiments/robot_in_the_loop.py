@@ -28,7 +28,7 @@ from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
 from contourslam.robot.pilot import Pilot, PilotConfig
 from contourslam.robot.route import sample_route
 from contourslam.simulation.config import YDLIDAR_X4, CameraModel, RobotModel
-from contourslam.simulation.hardware.board import SimulatedBoard
+from contourslam.simulation.hardware.board import BoardError, SimulatedBoard
 from contourslam.simulation.hardware.line import Damage
 from contourslam.simulation.hardware.live_world import Record, WorldConfig
 from contourslam.simulation.hardware.running_world import RunningWorld
@@ -104,8 +104,18 @@ class Firmware:
 
     @classmethod
     def built_in(cls, folder: Path) -> "Firmware":
-        """Give what stands in the folder that it is built in."""
-        return cls(folder / "board", folder / "mega.elf")
+        """Give what stands in the folder that it is built in.
+
+        Raises
+        ------
+        BoardError
+            If it is not there.
+        """
+        found = cls(folder / "board", folder / "mega.elf")
+        for path in (found.board, found.elf):
+            if not path.is_file():
+                raise BoardError(f"{path} is not there: run make firmware, which docs/robot_in_the_loop.md tells about")
+        return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,97 @@
+"""The command that drives the robot, against an X4 and a Mega on pseudo-terminals."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "robot" / "base"))  # the simulated Mega
+
+from mega_device import MegaDevice
+
+from contourslam.cli import main
+from contourslam.maps import load_map
+from contourslam.recordings import open_recording
+from contourslam.report.result_folder import read_result_folder
+from contourslam.robot.base.messages import Drive, Stop
+from contourslam.robot.config import BaseConfig, LidarPart, RobotConfig, save_robot
+from contourslam.scan import LaserScan, Odometry
+from contourslam.simulation.hardware.plugged_x4 import PluggedX4
+
+Failure = Callable[..., str]
+
+
+@pytest.fixture
+def mega(tmp_path: Path) -> Iterator[MegaDevice]:
+    made = MegaDevice(tmp_path / "base")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def robot(tmp_path: Path, mega: MegaDevice) -> Iterator[Path]:
+    """The robot.yaml of a robot with both."""
+    with PluggedX4(tmp_path / "lidar"):
+        path = tmp_path / "robot.yaml"
+        base, lidar = BaseConfig(port=str(tmp_path / "base")), LidarPart(port=str(tmp_path / "lidar"), x=0.0)
+        save_robot(path, RobotConfig(base, lidar))
+        yield path
+
+
+def test_a_drive_along_a_route_leaves_a_run_and_its_recording(
+    robot: Path, mega: MegaDevice, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, route = tmp_path / "out", tmp_path / "way.csv"
+    route.write_text("0, 0\n1, 0\n")
+    words = ["drive", "-o", str(out), "--robot", str(robot), "--route", str(route), "--seconds", "4", "--json"]
+    assert main(words) == 0
+    metrics = json.loads(capsys.readouterr().out)
+    assert metrics["scans"] > 8
+    run = read_result_folder(out)
+    assert run.result.readings is not None and len(run.result.readings.stamps) > 100
+    assert load_map(out / "map.cmap").about["back_end"] == metrics["back_end"]
+    assert (out / "index.html").exists()
+    recorded = list(open_recording(out / "recording").messages())
+    assert sum(isinstance(m, LaserScan) for m in recorded) >= metrics["scans"] - 2
+    assert sum(isinstance(m, Odometry) for m in recorded) > 100
+    drives = [(when, message) for when, message in mega.commands if isinstance(message, Drive)]
+    moving = [when for when, message in drives if message.left + message.right > 0]
+    assert moving and moving[0] - drives[0][0] > 1.5  # it stands at first
+    assert isinstance(mega.commands[-1][1], Stop)
+
+
+def test_ctrl_c_stops_the_motors_and_keeps_what_was_done(robot: Path, mega: MegaDevice, tmp_path: Path) -> None:
+    out, route = tmp_path / "out", tmp_path / "way.csv"
+    route.write_text("0, 0\n5, 0\n")
+    words = [sys.executable, "-m", "contourslam", "drive", "-o", str(out), "--robot", str(robot), "--route", str(route)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and not any(drive.left > 0 for drive in mega.drives()):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    said, complaints = process.communicate(timeout=60)
+    assert process.returncode == 0, complaints
+    assert "scans" in said and "stopping" in complaints
+    assert isinstance(mega.commands[-1][1], Stop)
+    assert read_result_folder(out).result.stamps.size > 0
+
+
+def test_what_cannot_go_together_is_told_before_anything_moves(tmp_path: Path, failure: Failure) -> None:
+    out, route = tmp_path / "out", tmp_path / "way.csv"
+    assert "choose one" in failure("drive", "-o", out, "--keys", "--route", route)
+    assert "--speed must be above 0" in failure("drive", "-o", out, "--speed", "0")
+    assert "way.csv: cannot be read" in failure("drive", "-o", out, "--route", route)
+    assert "robot.yaml: cannot be read" in failure("drive", "-o", out, "--robot", tmp_path / "robot.yaml")
+    assert "need a terminal" in failure("drive", "-o", out, "--keys")
+    assert not out.exists()
+
+
+def test_without_the_firmware_the_loop_says_how_to_build_it(tmp_path: Path, failure: Failure) -> None:
+    out = tmp_path / "out"
+    assert "run make firmware" in failure("robot-in-the-loop", "-o", out, "--firmware", tmp_path)
+    assert "no fault 'fire'" in failure("robot-in-the-loop", "-o", out, "--fault", "fire")
