@@ -123,7 +123,7 @@ class Lane:
         self._scans += 1
         weight = max(RECENT, 1.0 / self._scans)
         known = self._milliseconds
-        for stage in known.keys() | seconds.keys():
+        for stage in dict.fromkeys((*known, *seconds)):  # in the order in which they were first met
             before = known.get(stage, 0.0)
             known[stage] = before + weight * (1e3 * seconds.get(stage, 0.0) - before)
 

@@ -165,7 +165,7 @@ class Player(threading.Thread):
                 moved |= shift > LARGE
                 if shift > LARGE or loop.method != "nearby":
                     self._memory.add_event(
-                        moment.elapsed, "loop", f"closed a loop ({loop.method}), off by {shift:.2f} m", lane=number,
+                        moment.elapsed, "loop", f"loop by {loop.method}, {shift:.2f} m off", lane=number,
                         x=float(lane.last_pose[0]), y=float(lane.last_pose[1]), shift=shift,
                     )  # fmt: skip
             update = moment.lanes[number].update

@@ -112,7 +112,7 @@ export function drawStatus(model, seek) {
   const fact = (label, value, tone = "") => { text("dt", label, facts); text("dd", value, facts).dataset.tone = tone; };
   fact("scans", `${status.scans}`);
   fact("scans a second", status.scan_rate.toFixed(1));
-  fact("speed", `${status.reached.toFixed(1)}×${behind ? " (slower than asked for)" : ""}`, behind ? "bad" : "");
+  fact("speed", `${status.reached.toFixed(1)}×${behind ? ` of ${status.speed}×` : ""}`, behind ? "bad" : "");
   fact("beams that returned", status.beams ? `${status.returned} of ${status.beams}` : "–");
   const { median, most } = status.lag;
   fact("page behind mapping", median === null ? "–" : `${median.toFixed(0)} ms, at most ${most.toFixed(0)} ms`,
