@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.geometry.rigid import from_planar, inverse, rigid, rotation_from_vector, vector_from_rotation
 from contourslam.robot.camera.board import Board
 from contourslam.robot.camera.calibration import CalibrationError
@@ -12,11 +13,14 @@ from contourslam.robot.camera.extrinsics import Extrinsics, Stand, find_extrinsi
 from contourslam.robot.camera.plane_fit import fit_planes
 from contourslam.robot.camera.rotations import all_rotations
 from contourslam.robot.camera.segments import straight_pieces
+from contourslam.robot.camera.stands import place_seen
 from contourslam.robot.config import OPTICAL
 from contourslam.simulation.checkerboard import boards_before, scan_board
 
 BOARD = Board(7, 5, 0.06)
 CORNERS = BOARD.columns, BOARD.rows
+LENS = FisheyeModel(1280, 960, 1.5, 657.0, 656.0, 0.0, 647.0, 473.0, -0.36, 0.27, 1e-4, -1e-4)
+SURE = 1e-6 * np.eye(6)  # a board placed to 1 mm and 0.06 degrees
 ANGLES = np.linspace(-np.pi, np.pi, 720, endpoint=False)
 AHEAD, UP = OPTICAL, rotation_from_vector((0.0, -math.pi / 2.0, 0.0)) @ OPTICAL
 
@@ -29,21 +33,31 @@ def camera_place(seed: int) -> np.ndarray:
 
 
 def make_stands(T_lidar_camera: np.ndarray, seed: int, count: int = 15, noise: float = 0.01) -> list[Stand]:
-    """Boards in a room; the camera sees each 0.2 % too far or near and turned by 0.2 degrees."""
+    """Boards in a room, placed by corners with 0.2 pixels of noise."""
     rng = np.random.default_rng(seed)
     stands = []
-    to_middle = rigid(np.eye(3), BOARD.middle)
     for i, T_lidar_board in enumerate(boards_before(T_lidar_camera, CORNERS, BOARD.square, count, seed=seed)):
-        seen = inverse(T_lidar_camera) @ T_lidar_board @ to_middle
-        turned = rotation_from_vector(rng.normal(0.0, 0.003, 3)) @ seen[:3, :3]
-        seen = rigid(turned, seen[:3, 3] * (1.0 + rng.normal(0.0, 0.002))) @ inverse(to_middle)
+        place = inverse(T_lidar_camera) @ T_lidar_board
+        pixels, _ = LENS.project(BOARD.points @ place[:3, :3].T + place[:3, 3])
+        placed = place_seen(pixels + rng.normal(0.0, 0.2, pixels.shape), BOARD, LENS)
+        assert placed is not None
         scans = []
         for k in range(3):
             ranges = scan_board(T_lidar_board, CORNERS, BOARD.square, ANGLES, 3.0, margin=0.03, noise=noise,
                                 seed=1000 * seed + 10 * i + k)  # fmt: skip
             scans.append(np.column_stack([ranges * np.cos(ANGLES), ranges * np.sin(ANGLES)]))
-        stands.append(Stand(f"{i}", seen, tuple(scans)))
+        stands.append(Stand(f"{i}", *placed, tuple(scans)))
     return stands
+
+
+def on_boards(stands: list[Stand], T_camera_lidar: np.ndarray) -> tuple[list[np.ndarray], ...]:
+    """Boards, their covariances and the points on them, to fit to."""
+    boards, clouds = [stand.T_camera_board for stand in stands], []
+    for board, stand in zip(boards, stands, strict=True):
+        T = inverse(board @ rigid(np.eye(3), BOARD.middle)) @ T_camera_lidar
+        points = np.vstack(stand.scans)
+        clouds.append(points[(np.abs(points @ T[:3, :2].T + T[:3, 3]) < (0.22, 0.16, 0.06)).all(axis=1)])
+    return boards, [stand.covariance for stand in stands], clouds
 
 
 def off(found: Extrinsics, truth: np.ndarray) -> np.ndarray:
@@ -69,19 +83,13 @@ def test_the_covariance_is_that_of_the_errors() -> None:
     values = []
     for seed in range(20):
         truth = camera_place(seed)
-        stands = make_stands(truth, seed)
-        boards = [stand.T_camera_board @ rigid(np.eye(3), BOARD.middle) for stand in stands]
-        start, clouds = inverse(truth), []
-        for board, stand in zip(boards, stands, strict=True):
-            points = np.vstack(stand.scans)
-            local = points @ (inverse(board) @ start)[:3, :2].T + (inverse(board) @ start)[:3, 3]
-            clouds.append(points[(np.abs(local) < (0.22, 0.16, 0.06)).all(axis=1)])
-        found = fit_planes(start, boards, clouds)
+        start = inverse(truth)
+        found = fit_planes(start, *on_boards(make_stands(truth, seed), start))
         step = found.T_camera_lidar @ inverse(start)
         turn = vector_from_rotation(step[:3, :3])
         error = np.concatenate([found.T_camera_lidar[:3, 3] - start[:3, 3], turn])
         values.append(float(error @ np.linalg.solve(found.covariance, error)))
-    assert 3.5 < np.mean(values) < 10.0
+    assert 2.5 < np.mean(values) < 9.0
 
 
 def test_the_covariance_of_the_camera_is_that_of_the_lidar_turned_round() -> None:
@@ -95,21 +103,17 @@ def test_the_covariance_of_the_camera_is_that_of_the_lidar_turned_round() -> Non
     moved[:3, 3] += small[:3]
     T, moved = inverse(found.T_lidar_camera), inverse(moved)
     other = np.concatenate([moved[:3, 3] - T[:3, 3], vector_from_rotation(moved[:3, :3] @ T[:3, :3].T)])
-    boards = [stand.T_camera_board @ rigid(np.eye(3), BOARD.middle) for stand in stands]
-    clouds = []
-    for board, stand in zip(boards, stands, strict=True):
-        points = np.vstack(stand.scans)
-        local = points @ (inverse(board) @ T)[:3, :2].T + (inverse(board) @ T)[:3, 3]
-        clouds.append(points[(np.abs(local) < (0.25, 0.19, 0.06)).all(axis=1)])
-    covariance = fit_planes(T, boards, clouds).covariance
+    covariance = fit_planes(T, *on_boards(stands, T)).covariance
     here, there = small @ np.linalg.solve(found.covariance, small), other @ np.linalg.solve(covariance, other)
-    assert here == pytest.approx(there, rel=0.05)  # the choice of points may differ by a few at the edges
+    assert here == pytest.approx(there, rel=0.15)  # the choice of points may differ by a few at the edges
 
 
 def test_stands_in_which_the_lidar_misses_the_board_are_left_out_and_named() -> None:
     truth = camera_place(0)
     stands = make_stands(truth, 0)
-    missed = [Stand(f"missed {i}", rigid(np.eye(3), (0.0, 0.5, 1.0 + 0.1 * i)), stands[i].scans) for i in range(2)]
+    missed = [
+        Stand(f"missed {i}", rigid(np.eye(3), (0.0, 0.5, 1.0 + 0.1 * i)), SURE, stands[i].scans) for i in range(2)
+    ]
     found = find_extrinsics([*stands, *missed], BOARD, margin=0.03)
     assert np.linalg.norm(off(found, truth)[:3]) < 0.012
     assert [stand.points for stand in found.stands[-2:]] == [0, 0]
@@ -127,7 +131,7 @@ def test_boards_that_are_all_upright_leave_the_height_open_and_that_is_said() ->
         T_lidar_board = rigid(turn, at - turn @ BOARD.middle)
         ranges = scan_board(T_lidar_board, CORNERS, BOARD.square, ANGLES, 3.0, seed=i)
         scan = np.column_stack([ranges * np.cos(ANGLES), ranges * np.sin(ANGLES)])
-        stands.append(Stand(str(i), inverse(truth) @ T_lidar_board, (scan,)))
+        stands.append(Stand(str(i), inverse(truth) @ T_lidar_board, SURE, (scan,)))
     with pytest.raises(CalibrationError, match=r"leave the camera's place open.*tilt the board forwards"):
         find_extrinsics(stands, BOARD)
 
@@ -136,7 +140,7 @@ def test_too_few_stands_or_boards_of_another_room_are_refused() -> None:
     stands = make_stands(camera_place(0), 0)
     with pytest.raises(CalibrationError, match="3 times, and 4 are the least"):
         find_extrinsics(stands[:3], BOARD)
-    far = [Stand(s.name, rigid(np.eye(3), (0.0, 0.0, 9.0 + i)), s.scans) for i, s in enumerate(stands)]
+    far = [Stand(s.name, rigid(np.eye(3), (0.0, 0.0, 9.0 + i)), SURE, s.scans) for i, s in enumerate(stands)]
     with pytest.raises(CalibrationError, match="no place of the camera"):
         find_extrinsics(far, BOARD)
 

@@ -50,11 +50,15 @@ class Fit:
     lens_information : ndarray, shape (10, 10)
         Inverse covariance of the lens' parameters for a corner's standard deviation of one pixel, the places of the
         boards being unknown.
+    place_information : ndarray, shape (views, 6, 6)
+        The same of each board's small turn (rad, about its own origin) and move (m), along and about the camera's axes,
+        the lens being known.
     """
 
     bundle: Bundle
     residuals: Floats
     lens_information: Floats
+    place_information: Floats
 
     @property
     def rms(self) -> float:
@@ -158,7 +162,7 @@ def fit(
             damping *= 8.0
     lens, places, mixed, _, _ = _normal(residuals, by_lens, by_place, None)
     information = lens - np.einsum("vip,vpq,vjq->ij", mixed, np.linalg.pinv(places), mixed)
-    return Fit(bundle, residuals, information)
+    return Fit(bundle, residuals, information, places)
 
 
 def _linearise(bundle: Bundle, board: Floats, seen: Floats) -> tuple[Floats, Floats, Floats]:

@@ -45,12 +45,15 @@ class Stand:
         Such as its time.
     T_camera_board : ndarray, shape (4, 4)
         m.
+    covariance : ndarray, shape (6, 6)
+        Of a small turn (rad) of the board about its origin and of a small move (m), about and along the camera's axes.
     scans : tuple of ndarray, each of shape (n, 2)
         Points of scans taken meanwhile, in the order of the beams, lidar frame, m; NaN where nothing was hit.
     """
 
     name: str
     T_camera_board: Floats
+    covariance: Floats
     scans: tuple[Floats, ...]
 
 
@@ -137,7 +140,7 @@ def find_extrinsics(stands: Sequence[Stand], board: Board, *, margin: float = 0.
     points = [cloud[np.isfinite(cloud).all(axis=1)] for cloud in points]
     best: tuple[float, PlaneFit | None] = -math.inf, None
     for turn in _likely_turns(stands, boards, half):
-        found = _follow(rigid(turn, np.zeros(3)), boards, points, half)
+        found = _follow(rigid(turn, np.zeros(3)), stands, boards, points, half)
         if found is None:
             continue
         score = float(sum(found.used)) - found.rms / _GATES[-1]
@@ -177,7 +180,7 @@ def _likely_turns(stands: Sequence[Stand], boards: Sequence[Floats], half: Float
 
 
 def _follow(
-    T_camera_lidar: Floats, boards: Sequence[Floats], points: Sequence[Floats], half: Floats
+    T_camera_lidar: Floats, stands: Sequence[Stand], boards: Sequence[Floats], points: Sequence[Floats], half: Floats
 ) -> PlaneFit | None:
     """Fit to the points near each board, with an ever closer gate."""
     found = None
@@ -186,7 +189,12 @@ def _follow(
             chosen = [_on_board(T_camera_lidar, *pair, half, gate) for pair in zip(boards, points, strict=True)]
             if sum(len(cloud) >= _FEWEST for cloud in chosen) < LEAST_STANDS:
                 return None
-            found = fit_planes(T_camera_lidar, boards, [c if len(c) >= _FEWEST else c[:0] for c in chosen])
+            found = fit_planes(
+                T_camera_lidar,
+                [stand.T_camera_board for stand in stands],
+                [stand.covariance for stand in stands],
+                [cloud if len(cloud) >= _FEWEST else cloud[:0] for cloud in chosen],
+            )
             T_camera_lidar = found.T_camera_lidar
             if np.linalg.norm(T_camera_lidar[:3, 3]) > 2.0 * _NEAR:
                 return None

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.geometry.rigid import rigid
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.recording import Message
 from contourslam.robot.camera.board import Board
@@ -24,6 +25,8 @@ _STILL_DEG = 0.3  # that the corners may wander between two pictures
 _ALONE = 3.0  # s without another picture before and after: then one picture is a stand
 _AROUND = 0.15  # s before the first and after the last picture in which the board still stood
 _SCANS = 20  # of a stand, at most
+_LEAST_NOISE = 0.1  # pixels
+_LENS_ERROR = 0.0015  # rad: by so much the rays of a lens as it is calibrated are off, the same over a board
 _POOR = 1.5  # pixels: then the lens is not this one, or the corners are another thing's
 
 
@@ -87,10 +90,10 @@ def find_stands(
                 scans[i].append(_points(message))
     stands = []
     for group, seen in zip(groups, scans, strict=True):
-        place = _place(group, board, lens)
-        if seen and place is not None:
+        placed = place_seen(np.mean([sight.corners for sight in group], axis=0), board, lens)
+        if seen and placed is not None:
             some = seen[:: -(-len(seen) // _SCANS)]
-            stands.append(Stand(f"at {group[0].stamp:.1f} s", place, tuple(some)))
+            stands.append(Stand(f"at {group[0].stamp:.1f} s", *placed, tuple(some)))
     return stands
 
 
@@ -120,15 +123,34 @@ def _points(scan: LaserScan) -> Floats:
     return np.column_stack([ranges * np.cos(scan.angles), ranges * np.sin(scan.angles)])
 
 
-def _place(group: Sequence[Sight], board: Board, lens: FisheyeModel) -> Floats | None:
-    """Place of the board by the mean of its corners; None where the lens does not fit them."""
-    corners = np.mean([sight.corners for sight in group], axis=0)[None]
-    start, misfits = place_boards(lens, board.points, corners)
+def place_seen(corners: Floats, board: Board, lens: FisheyeModel) -> tuple[Floats, Floats] | None:
+    """Place a board by its corners, and say how well they tell it.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (n, 2)
+        Pixels, in the order of :attr:`Board.points`.
+    board : Board
+    lens : FisheyeModel
+
+    Returns
+    -------
+    T_camera_board : ndarray, shape (4, 4)
+        m.
+    covariance : ndarray, shape (6, 6)
+        See :attr:`Stand.covariance`.
+        None instead of both where the lens does not fit the corners.
+    """
+    start, misfits = place_boards(lens, board.points, corners[None])
     if not np.isfinite(misfits).all():
         return None
-    found = fit(start, board.points, corners, np.zeros(len(NAMES), dtype=bool))
+    found = fit(start, board.points, corners[None], np.zeros(len(NAMES), dtype=bool))
     if found.rms > _POOR:
         return None
-    place = np.eye(4)
-    place[:3, :3], place[:3, 3] = found.bundle.turns[0], found.bundle.places[0]
-    return place
+    sigma = max(found.rms / np.sqrt(2.0), _LEAST_NOISE)
+    covariance = sigma**2 * np.linalg.inv(found.place_information[0])
+    # All rays to the board are off alike: it moves across them, and turns with them.
+    ray = found.bundle.places[0] + found.bundle.turns[0] @ board.middle
+    covariance[:3, :3] += _LENS_ERROR**2 * np.eye(3)
+    covariance[3:, 3:] += _LENS_ERROR**2 * (ray @ ray * np.eye(3) - np.outer(ray, ray))
+    return rigid(found.bundle.turns[0], found.bundle.places[0]), 0.5 * (covariance + covariance.T)
