@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from painted_room import BOX, BOX_CORNERS, CORNERS, HIGH
+from painted_room import BOX, BOX_CORNERS, CORNERS, DEEP, HIGH, WIDE
 
 from contourslam.errors import MapError
 from contourslam.maps.saved_map import SavedMap
@@ -145,12 +145,12 @@ def box_surfaces():
     return tuple(upright(f"contour-{n}", "contour", BOX_CORNERS[n], BOX_CORNERS[(n + 1) % 4], BOX) for n in range(4))
 
 
-def test_the_floor_covers_the_room_and_not_what_stands_in_it():
-    blocks = occluders(room_surfaces(*box_surfaces()))
-    (floor,) = seen_floor(
-        np.array([[1.0, 1.0, 0.0], [3.0, 2.5, 0.0], [1.0, 2.5, 0.0], [3.0, 0.5, 0.0]]), blocks, 8.0, 0.04
-    )
-    assert floor.area == pytest.approx(4.0 * 3.0 - 0.25, rel=0.06)
+def test_the_floor_covers_the_room_and_goes_on_under_a_box_and_not_behind_a_door():
+    walls = [wall for wall in room_surfaces(*box_surfaces()) if wall.name != "wall-1"]
+    walls.append(upright("wall-1", "wall", np.array([WIDE, DEEP]), np.array([WIDE, 1.0]), HIGH))  # open below
+    way = np.array([[1.0, 1.0, 0.0], [3.0, 2.5, 0.0], [1.0, 2.5, 0.0], [3.0, 0.5, 0.0]])
+    (floor,) = seen_floor(way, occluders(tuple(walls)), 8.0, 0.02)
+    assert floor.area == pytest.approx(WIDE * DEEP, rel=0.03)
 
 
 @given(st.lists(st.lists(st.booleans(), min_size=1, max_size=7), min_size=1, max_size=7))

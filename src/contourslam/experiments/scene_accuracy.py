@@ -149,10 +149,11 @@ def judge_scene(scene: Scene, textures: RoomTextures) -> tuple[float, tuple[Surf
     surfaces : tuple of SurfaceAccuracy
     """
     found = []
+    normals = np.array([other.normal for other in textures.surfaces])
     for surface, texture, seen in zip(scene.surfaces, scene.textures, scene.seen, strict=True):
         if surface.kind in FLAT or surface.kind == "behind":
             continue
-        truth, offsets, there = _truth(surface, seen, textures)
+        truth, offsets, there = _truth(surface, seen, textures, normals)
         if there.sum() >= _FEWEST:
             found.append((surface.name, texture[seen][there].astype(float), truth[there], offsets[there], there.mean()))
     if not found:
@@ -173,7 +174,7 @@ def judge_scene(scene: Scene, textures: RoomTextures) -> tuple[float, tuple[Surf
 
 
 def _truth(
-    surface: Surface, seen: NDArray[np.bool_], textures: RoomTextures
+    surface: Surface, seen: NDArray[np.bool_], textures: RoomTextures, normals: Floats
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """True colours of the texels that are seen (n, 3), how far the true surface is, m, and whether there is one."""
     rows, columns = np.nonzero(seen)
@@ -181,13 +182,11 @@ def _truth(
     v = (1.0 - (rows + 0.5) / seen.shape[0]) * surface.height
     places = surface.at(u, v)
     colours, offsets = np.zeros((len(places), 3)), np.full(len(places), np.inf)
-    for other in textures.surfaces:
-        facing = float(other.normal @ surface.normal)
-        if facing < _FACING:
-            continue
+    for index in np.flatnonzero(normals @ surface.normal > _FACING).tolist():
+        other = textures.surfaces[index]
         across, below, before = other.places(places).T
         nearer = (across >= 0) & (across <= other.width) & (below >= 0) & (below <= other.height)
         nearer &= np.abs(before) < np.minimum(offsets, _WITHIN)
-        colours[nearer] = other.colours(other.places(places[nearer])[:, :2]) * illumination(other.normal)
+        colours[nearer] = other.colours(other.places(places[nearer])[:, :2]) * illumination(normals[index])
         offsets[nearer] = np.abs(before[nearer])
     return colours, offsets, np.isfinite(offsets)

@@ -175,8 +175,7 @@ def cut_to_height(
         Called with the fraction done.
     """
     top = max(options.height, options.furniture_height)
-    tall = tuple(s if s.kind == "floor" else s.cut(top) for s in surfaces)
-    looked_at = tuple(s for s in tall if s.kind != "floor")
+    looked_at = tuple(s.cut(top) for s in surfaces if s.kind != "floor")
     texel = texel_for(looked_at, options.texel, options.most_texels)
     grid, blocks = TexelGrid.over(looked_at, texel), occluders(looked_at)
     choice = choose(grid, views.chosen, lens, blocks, texel, lambda done: told(0.4 * done))
@@ -187,7 +186,8 @@ def cut_to_height(
     walls = [*whole_walls(looked_at, heights), *closed]
     cut = [s.cut(_settled(s, h, walls, options)) for s, h in zip(looked_at, heights, strict=True)]
     standing = (*cut, *(s.cut(options.height) for s in closed))
-    return (*standing, *lids(standing, options.height), *(s for s in tall if s.kind == "floor"))
+    floors = seen_floor(poses, occluders(standing), _REACH, _FLOOR_CELL)
+    return (*standing, *lids(standing, options.height), *floors)
 
 
 def _settled(surface: Surface, found: float | None, walls: list[Surface], options: SceneOptions) -> float:

@@ -19,7 +19,7 @@ _MOST = 40.0  # m along a side of one piece
 
 
 def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tuple[Surface, ...]:
-    """Lay a floor wherever something stands in sight of the way.
+    """Lay a floor wherever something stands in sight of the way, and where blocks shut it in.
 
     Parameters
     ----------
@@ -44,13 +44,18 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
         return ()
     angles = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
     rings = [sights(place, angles, blocks, reach) for place in places]
-    low = np.min([ring.min(axis=0) for ring in rings], axis=0)
+    low = np.min([ring.min(axis=0) for ring in rings], axis=0) - 2.0 * cell
     size = np.max([ring.max(axis=0) for ring in rings], axis=0) - low
-    columns, rows = (int(n) for n in np.ceil(size / cell) + 1)
+    columns, rows = (int(n) for n in np.ceil(size / cell) + 2)
     seen = np.zeros((rows, columns), np.uint8)
     for ring in rings:
-        cv2.fillPoly(seen, [np.round((ring - low) / cell * 16 - 8).astype(np.int32)], 1, shift=4)
+        cv2.fillPoly(seen, [_fixed(ring, low, cell)], 1, shift=4)
     seen = _largest(cv2, np.asarray(cv2.morphologyEx(seen, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8))
+    shut = seen.copy()
+    cv2.polylines(shut, [_fixed(b[:4].reshape(2, 2), low, cell) for b in blocks], False, 1, 2, shift=4)
+    cv2.floodFill(shut, None, (0, 0), 2)
+    shut_in = cv2.dilate((shut == 0).astype(np.uint8), np.ones((5, 5), np.uint8))  # and under the walls about it
+    seen[(np.asarray(shut_in) > 0) & (shut != 2)] = 1  # under furniture there is a floor too
     step = max(int(_MOST / cell), 1)
     floors: list[Surface] = []
     for row in range(0, rows, step):
@@ -59,6 +64,11 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
             if part.any():
                 floors.append(_piece(part, low + cell * np.array([column, row]), cell, len(floors)))
     return tuple(floors)
+
+
+def _fixed(places: Floats, low: Floats, cell: float) -> NDArray[np.int32]:
+    """Places in cells, as OpenCV takes them with four binary digits behind the point."""
+    return np.asarray(np.round((places - low) / cell * 16 - 8), np.int32)
 
 
 def _piece(part: Bools, corner: Floats, cell: float, number: int) -> Surface:

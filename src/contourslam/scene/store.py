@@ -46,6 +46,7 @@ def write_scene(folder: Path, scene: Scene, views: Views, poses: Floats) -> dict
     MissingExtraError
         If trimesh or Pillow is not installed.
     """
+    make_folder(folder)
     parts = [scene.seen_part(index) for index in range(len(scene.surfaces))]
     model = to_glb(scene.surfaces, pack(list(scene.textures)), parts)
     pictures = {ABOVE: _png(doll_house(scene)), INSIDE: _png(from_inside(scene, poses))}
@@ -65,7 +66,6 @@ def write_scene(folder: Path, scene: Scene, views: Views, poses: Floats) -> dict
         },
         "notes": list(scene.notes),
     }
-    make_folder(folder)
     for name, content in pictures.items():
         write_bytes(folder / name, content)
     write_text(folder / ABOUT, json.dumps(about, indent=2) + "\n")
@@ -77,5 +77,5 @@ def _png(image: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(image).save(content, format="PNG", optimize=True)
+    Image.fromarray(image).save(content, format="PNG")
     return content.getvalue()

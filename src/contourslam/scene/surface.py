@@ -47,7 +47,8 @@ class Surface:
     @property
     def normal(self) -> Floats:
         """Unit vector towards the viewer, shape (3,)."""
-        return np.cross(self.across, self.up)
+        (ax, ay, az), (ux, uy, uz) = self.across.tolist(), self.up.tolist()
+        return np.array([ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux])  # np.cross takes ten times as long
 
     @property
     def segment(self) -> Floats:
