@@ -42,7 +42,7 @@ class Pace:
         self._steps = 0
         self._hurry = -math.inf
         self._stopped = self.pressed = False
-        self._reached: deque[tuple[float, float]] = deque(maxlen=512)
+        self._reached: deque[tuple[float, float]] = deque(maxlen=200)
 
     # What people ask for.
 

@@ -1,5 +1,6 @@
 """A recording as a show: a player, its lanes, and what the pages are told of them."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -104,7 +105,7 @@ class Replayed:
             "state": player.state,
             "trouble": player.trouble,
             "paused": pace.paused,
-            "speed": pace.speed,
+            "speed": None if math.isinf(pace.speed) else pace.speed,
             "hurries_to": pace.hurries_to,
             "reached": pace.reached(),
             "head": 0.0 if newest is None else newest.elapsed,

@@ -36,9 +36,22 @@ def pack(kind: str, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]
         padding = -len(data) % ALIGNED
         pieces += [data, bytes(padding)]
         at += len(data) + padding
-    text = json.dumps(plain({"kind": kind, **header, "arrays": places}), separators=(",", ":")).encode()
+    text = _dump({"kind": kind, **header, "arrays": places}).encode()
     text += b" " * (-(len(text) + 4) % ALIGNED)
     return b"".join([len(text).to_bytes(4, "little"), text, *pieces])
+
+
+def _dump(values: dict[str, Any]) -> str:
+    try:  # most headers hold nothing that has to be looked for
+        return json.dumps(values, separators=(",", ":"), allow_nan=False, default=_listed)
+    except ValueError:
+        return json.dumps(plain(values), separators=(",", ":"))
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return dict(value)
 
 
 def plain(value: Any) -> Any:
