@@ -79,7 +79,10 @@ def test_the_place_is_found_without_a_guess_whichever_way_the_camera_looks(seed:
 
 
 def test_the_covariance_is_that_of_the_errors() -> None:
-    """Mean normalised error squared over 20 trials, started at the truth for speed; its expectation is 6."""
+    """Mean normalised error squared over 20 trials, started at the truth for speed; its expectation is 6.
+
+    Here the lens is known exactly: what the covariance allows for its error makes the figure smaller.
+    """
     values = []
     for seed in range(20):
         truth = camera_place(seed)
@@ -89,7 +92,7 @@ def test_the_covariance_is_that_of_the_errors() -> None:
         turn = vector_from_rotation(step[:3, :3])
         error = np.concatenate([found.T_camera_lidar[:3, 3] - start[:3, 3], turn])
         values.append(float(error @ np.linalg.solve(found.covariance, error)))
-    assert 2.5 < np.mean(values) < 9.0
+    assert 1.5 < np.mean(values) < 7.0
 
 
 def test_the_covariance_of_the_camera_is_that_of_the_lidar_turned_round() -> None:

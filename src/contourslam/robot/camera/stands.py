@@ -26,7 +26,7 @@ _ALONE = 3.0  # s without another picture before and after: then one picture is 
 _AROUND = 0.15  # s before the first and after the last picture in which the board still stood
 _SCANS = 20  # of a stand, at most
 _LEAST_NOISE = 0.1  # pixels
-_LENS_ERROR = 0.0015  # rad: by so much the rays of a lens as it is calibrated are off, the same over a board
+_LENS_ERROR = 0.0025  # rad: by so much the rays of a lens as it is calibrated are off, the same over a board
 _POOR = 1.5  # pixels: then the lens is not this one, or the corners are another thing's
 
 
