@@ -3,7 +3,7 @@
 import numpy as np
 
 from contourslam.experiments.scene_accuracy import scene_accuracy
-from contourslam.scene.build import SceneOptions
+from contourslam.scene.raising import SceneOptions
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import FURNISHED_ROOM
 

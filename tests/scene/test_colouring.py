@@ -8,7 +8,8 @@ from painted_room import BOX, HIGH, LENS, MODEL, POSES, as_picture, colours_at, 
 
 from contourslam.errors import RecordingError
 from contourslam.recordings.picture import Picture
-from contourslam.scene.build import SceneOptions, build_scene, cut_to_height
+from contourslam.scene.build import build_scene
+from contourslam.scene.raising import SceneOptions, cut_to_height
 from contourslam.scene.views import Views
 
 OPTIONS = SceneOptions(height=HIGH, find_heights=False, texel=0.04)

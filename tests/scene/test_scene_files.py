@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 from painted_room import HIGH, LENS, POSES, views_of
 from PIL import Image
 
-from contourslam.errors import ResultError
-from contourslam.scene import preview
+from contourslam.errors import MissingExtraError, ResultError
+from contourslam.scene import extras, preview
 from contourslam.scene.atlas import BORDER, LARGEST, pack
-from contourslam.scene.build import SceneOptions, build_scene
+from contourslam.scene.build import build_scene
 from contourslam.scene.glb import to_glb
+from contourslam.scene.raising import SceneOptions
 from contourslam.scene.render import look_at, panels, render
 from contourslam.scene.store import write_scene
 from contourslam.scene.surface import Surface, upright
@@ -170,3 +171,9 @@ def test_a_picture_from_within_reaches_behind_the_eye():
     eye = look_at(np.array([0.0, 0.0, 1.0]), np.array([0.0, 5.0, 0.9]), 90.0, 80, 60)
     image = render(panels([(frame(floor), coloured((1, 2, 3)))]), eye, (9, 9, 9))
     assert (image[59] == [1, 2, 3]).all() and (image[0] == [9, 9, 9]).all()
+
+
+def test_a_missing_library_is_named_before_any_work(monkeypatch):
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "cv2" else name)
+    with pytest.raises(MissingExtraError, match=r"OpenCV: pip install 'contourslam\[camera\]'"):
+        extras.check_extras()

@@ -12,10 +12,10 @@ from contourslam.errors import MapError
 from contourslam.maps.saved_map import SavedMap
 from contourslam.scene.behind import walls_behind
 from contourslam.scene.bodies import bodies, lids
-from contourslam.scene.build import SceneOptions, raise_surfaces
 from contourslam.scene.facets import find_facets
 from contourslam.scene.floor import rectangles, seen_floor
 from contourslam.scene.occlusion import occluders, visible
+from contourslam.scene.raising import SceneOptions, raise_surfaces
 from contourslam.scene.surface import TexelGrid, upright
 from contourslam.scene.walls import clean_walls, join_ends, square_up
 from contourslam.slam.landmark_map import CornerMap, WallMap

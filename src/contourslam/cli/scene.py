@@ -56,7 +56,8 @@ class Scene:
         """Build the scene, write it and say what came out."""
         from contourslam.recordings import open_recording
         from contourslam.recordings.trajectories import read_trajectory
-        from contourslam.scene.build import SceneOptions, build_scene, raise_surfaces
+        from contourslam.scene.build import build_scene
+        from contourslam.scene.raising import SceneOptions, raise_surfaces
         from contourslam.scene.store import GLB, write_scene
         from contourslam.scene.views import choose_views
 

@@ -12,8 +12,9 @@ from contourslam.errors import ResultError
 from contourslam.experiments.known_room import told
 from contourslam.recordings.picture import Picture
 from contourslam.replay import keep_map, make_mapper, replay
-from contourslam.scene.build import Scene, SceneOptions, build_scene, raise_surfaces
+from contourslam.scene.build import Scene, build_scene
 from contourslam.scene.lens import Lens
+from contourslam.scene.raising import SceneOptions, raise_surfaces
 from contourslam.scene.surface import FLAT, Surface
 from contourslam.scene.views import Views, choose_views
 from contourslam.simulation.camera import FisheyeCamera

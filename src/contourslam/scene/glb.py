@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam import __version__
-from contourslam.errors import MissingExtraError
 from contourslam.scene.atlas import Atlas, Place
+from contourslam.scene.extras import check_extras
 from contourslam.scene.surface import Surface
 
 Floats = NDArray[np.float64]
@@ -42,15 +42,13 @@ def to_glb(surfaces: tuple[Surface, ...], atlas: Atlas, seen: list[float]) -> by
     MissingExtraError
         If trimesh or Pillow is not installed.
     """
-    try:
-        from PIL import Image
+    check_extras()
+    from PIL import Image
 
-        trimesh, gltf, material, texture = (  # most of which says nothing of its types
-            cast(Any, import_module(f"trimesh{part}"))
-            for part in ("", ".exchange.gltf", ".visual.material", ".visual.texture")
-        )
-    except ImportError as error:
-        raise MissingExtraError("scenes need trimesh and Pillow: pip install 'contourslam[camera]'") from error
+    trimesh, gltf, material, texture = (  # most of which says nothing of its types
+        cast(Any, import_module(f"trimesh{part}"))
+        for part in ("", ".exchange.gltf", ".visual.material", ".visual.texture")
+    )
     # Stand-ins, which differ so that trimesh keeps them apart; the sheets take their places as JPEG.
     standins = [Image.new("RGB", (1, 1), (n % 256, n // 256, 0)) for n in range(len(atlas.sheets))]
     materials = [
