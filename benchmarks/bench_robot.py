@@ -5,7 +5,8 @@ import sys
 import numpy as np
 
 from contourslam.cli.run import DEFAULTS
-from contourslam.experiments.robot_in_the_loop import FAULTS, Fault, Firmware, LoopConfig, LoopResult, robot_in_the_loop
+from contourslam.experiments.loop_values import FAULTS, Fault, Firmware, LoopConfig, LoopResult
+from contourslam.experiments.robot_in_the_loop import robot_in_the_loop
 from table import ROOT, Table, publish
 
 SEEDS, SECONDS = 5, 100.0

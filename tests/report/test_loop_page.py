@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from contourslam.cli.run import DEFAULTS
-from contourslam.experiments.robot_in_the_loop import Counters, LoopConfig, LoopResult
+from contourslam.experiments.loop_values import Counters, LoopConfig, LoopResult
 from contourslam.geometry.poses import interpolate
 from contourslam.recordings.picture import Picture
 from contourslam.report.loop_page import kept, loop_metrics, write_loop_report

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from contourslam.cli.run import DEFAULTS
-from contourslam.experiments.robot_in_the_loop import Firmware, LoopConfig, robot_in_the_loop
+from contourslam.experiments.loop_values import Firmware, LoopConfig
+from contourslam.experiments.robot_in_the_loop import robot_in_the_loop
 from contourslam.recordings import open_recording
 from contourslam.report.loop_page import write_loop_report
 

@@ -43,7 +43,8 @@ class RobotInTheLoop:
 
     def execute(self, command: str) -> int:
         """Drive, write the report and say how it went."""
-        from contourslam.experiments.robot_in_the_loop import Firmware, LoopConfig, fault_named, robot_in_the_loop
+        from contourslam.experiments.loop_values import Firmware, LoopConfig, fault_named
+        from contourslam.experiments.robot_in_the_loop import robot_in_the_loop
         from contourslam.report.loop_page import kept, loop_metrics, write_loop_report
 
         config = LoopConfig(

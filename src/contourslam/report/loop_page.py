@@ -9,7 +9,7 @@ import numpy as np
 from contourslam import __version__
 from contourslam.atomic import make_folder, write_bytes, write_text
 from contourslam.evaluation.metrics import run_metrics
-from contourslam.experiments.robot_in_the_loop import FAULTS, LoopResult
+from contourslam.experiments.loop_values import FAULTS, LoopResult
 from contourslam.report.page.album import embedded
 from contourslam.report.page.markup import Cell, Picture, Row, Section, figure, page, pair, paragraph, table, tiles
 from contourslam.report.page.run import reproduce, truth

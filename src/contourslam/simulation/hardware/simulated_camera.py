@@ -13,7 +13,6 @@ from contourslam.simulation.camera import FisheyeCamera
 from contourslam.simulation.config import CameraModel
 from contourslam.simulation.room import Room
 
-
 _READY = 180.0  # s; painting the walls takes some of them
 
 
