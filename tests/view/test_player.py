@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from contourslam.config import Config, GraphConfig
+from contourslam.config import Config
 from contourslam.errors import ConfigError, RecordingError
 from contourslam.replay import replay
 from contourslam.scan import LaserScan
@@ -17,7 +17,7 @@ BACK_ENDS = ["ekf", pytest.param("graph", marks=pytest.mark.skipif(find_spec("gt
 
 @pytest.mark.parametrize("back_end", BACK_ENDS)
 def test_a_watched_replay_gives_the_poses_of_one_that_nobody_watches(back_end, drive, replayed) -> None:
-    config = Config(back_end=back_end, graph=GraphConfig(loops=False))
+    config = Config(back_end=back_end)
     one = replayed(30, config=config)
     one.player.run()
     assert (one.player.state, one.player.error, one.player.trouble) == ("finished", None, "")

@@ -188,6 +188,11 @@ class GraphSlam:
         """Of the last keyframe; None before the first."""
         return self._landmarks.look
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing waits for the next update: to draw up the map then changes nothing in what follows."""
+        return self._graph.settled
+
     def path(self) -> Floats:
         """Base in the world at each scan as it is seen now, shape (t, 3), for those who draw it."""
         if not self._scans:

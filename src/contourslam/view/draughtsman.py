@@ -44,7 +44,7 @@ class Draughtsman:
         """
         now = self._clock()
         for number in range(len(self._lanes)):
-            if not self._wanted[number]:
+            if not (self._wanted[number] and self._lanes[number].at_rest):
                 continue
             rest = REST_LOOP if self._urgent[number] else REST_IDLE if idle else REST
             if now >= self._ended[number] + max(PAUSE, rest * self._took[number]):

@@ -115,6 +115,11 @@ class Lane:
         """Pose at the last scan as it was known then, shape (3,)."""
         return self._poses[-1]
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the map can be drawn up without a change in what the mapper does next."""
+        return self._graph is None or self._graph.at_rest
+
     def contours(self) -> Contours | None:
         """Those of the last scan, in the lidar's frame; None where the mapper does not show them."""
         return None if self._watched is None else self._watched.contours

@@ -183,7 +183,6 @@ class Player(threading.Thread):
         for number, lane in enumerate(self.lanes):
             if self._pace.stopped:
                 return
-            self._draughtsman.draw(number, self._elapsed)
             if lane.mapper.finish() is not None:
                 self._memory.add_event(self._elapsed, "refined", "the whole map was refined", lane=number)
             self._draughtsman.draw(number, self._elapsed)
