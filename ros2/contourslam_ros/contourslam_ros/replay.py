@@ -9,7 +9,7 @@ from rclpy.node import Node
 
 from contourslam.cli import main as contourslam
 from contourslam.errors import ContourslamError
-from contourslam.report.config_file import write_config
+from contourslam.settings_file import write_settings
 from contourslam_ros.settings import declared
 
 
@@ -39,7 +39,7 @@ def main() -> int:
         rclpy.try_shutdown()  # nothing is heard or said while the bag is mapped, and Ctrl-C is the command's own
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "config.yaml"
-        write_config(config, settings.core)
+        write_settings(config, settings.core)
         return contourslam([*arguments, "--config", str(config)])
 
 

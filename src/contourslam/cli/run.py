@@ -68,9 +68,9 @@ class Run(Reading):
         for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
             name, equals, value = argument.partition("=")
             if name == "--config" and (value or following):
-                from contourslam.report.config_file import read_config
+                from contourslam.settings_file import read_settings
 
-                settings = read_config(Path(value if equals else following))
+                settings = read_settings(Path(value if equals else following), Config)
         return cls(recording=tyro.MISSING, output=tyro.MISSING, settings=settings)
 
     def execute(self, command: str) -> int:

@@ -6,7 +6,6 @@ from contourslam import __version__
 from contourslam.atomic import make_folder, write_text
 from contourslam.experiments.study import Study
 from contourslam.report.comparison_metrics import comparison_metrics, mean, shared
-from contourslam.report.config_file import write_config
 from contourslam.report.figures.style import label
 from contourslam.report.page import (
     adaptation,
@@ -23,6 +22,7 @@ from contourslam.report.page.common import Gallery
 from contourslam.report.page.markup import page
 from contourslam.report.paper import TABLE_I
 from contourslam.report.result_folder import to_json
+from contourslam.settings_file import write_settings
 
 _INCOMPLETE = "INCOMPLETE: the work was stopped early; this page shows what was done by then."
 
@@ -53,7 +53,7 @@ def write_report(folder: Path, study: Study, *, command: str = "") -> Path:
     """
     make_folder(folder / "figures")
     write_text(folder / "metrics.json", to_json(comparison_metrics(study, command=command)))
-    write_config(
+    write_settings(
         folder / "config.yaml", study.comparison.config, header=f"contourslam {__version__}\n{command}".strip()
     )
     gallery = Gallery(folder)

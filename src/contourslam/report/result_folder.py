@@ -14,7 +14,6 @@ from contourslam.atomic import make_folder, remove, write_text
 from contourslam.config import Config
 from contourslam.errors import RecordingError, ResultError
 from contourslam.recordings.trajectories import read_trajectory, write_trajectory
-from contourslam.report.config_file import read_config, write_config
 from contourslam.report.loop_table import read_loop_table, write_loop_table
 from contourslam.report.map_files import write_geojson
 from contourslam.report.map_reader import read_geojson
@@ -22,6 +21,7 @@ from contourslam.report.nav2_map import write_nav2_map
 from contourslam.report.occupancy import OccupancyGrid
 from contourslam.report.scan_table import read_scan_table, write_scan_table
 from contourslam.report.svg.way import map_drawing
+from contourslam.settings_file import read_settings, write_settings
 from contourslam.slam.dense import dense_trajectory
 from contourslam.slam.result import OdometryReadings, RunResult
 
@@ -115,7 +115,7 @@ def write_result_folder(
         write_loop_table(folder / LOOPS, result.loops)
     else:
         remove(folder / LOOPS)
-    write_config(folder / "config.yaml", config, header=f"contourslam {__version__}\n{command}".strip())
+    write_settings(folder / "config.yaml", config, header=f"contourslam {__version__}\n{command}".strip())
     if grid is not None:
         write_nav2_map(folder, grid)
     run = {
@@ -164,7 +164,7 @@ def read_result_folder(folder: Path) -> StoredRun:
         loops=read_loop_table(folder / LOOPS),
         readings=None if readings_before is None else _readings(folder / ODOMETRY, readings_before),
     )
-    return StoredRun(result, read_config(folder / "config.yaml"), metrics)
+    return StoredRun(result, read_settings(folder / "config.yaml", Config), metrics)
 
 
 def _online_poses(path: Path, scans: RunResult) -> NDArray[np.float64] | None:

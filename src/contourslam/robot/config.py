@@ -1,7 +1,6 @@
 """The robot as it is built, and the file that says so: ``robot.yaml``, in SI units."""
 
 import dataclasses
-import io
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,10 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.atomic import write_text
 from contourslam.errors import ConfigError
 from contourslam.geometry.fisheye import FisheyeModel
-from contourslam.robot.settings import build
+from contourslam.settings_file import read_settings, write_settings
 
 Floats = NDArray[np.float64]
 
@@ -189,22 +187,9 @@ def load_robot(path: Path) -> RobotConfig:
     Raises
     ------
     ConfigError
-        If the file is missing or not YAML, or a name or a value in it is wrong; the message names file and place, and
-        the nearest name that is known.
+        As :func:`contourslam.settings_file.read_settings`.
     """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: is not valid YAML ({' '.join(str(error).split())})") from error
-    try:
-        return build(RobotConfig, content)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
+    return read_settings(path, RobotConfig)
 
 
 def save_robot(path: Path, config: RobotConfig, *, header: str = "") -> None:
@@ -222,11 +207,4 @@ def save_robot(path: Path, config: RobotConfig, *, header: str = "") -> None:
     ResultError
         If the file cannot be written.
     """
-    from ruamel.yaml import YAML
-
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = False
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # declared None, documented as bool
-    buffer = io.StringIO()
-    yaml.dump(dataclasses.asdict(config), buffer)
-    write_text(path, "".join(f"# {line}\n" for line in header.splitlines()) + buffer.getvalue())
+    write_settings(path, config, header=header)

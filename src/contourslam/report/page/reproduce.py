@@ -1,9 +1,9 @@
 """How to get these numbers again: command, configuration, versions, machine."""
 
 from contourslam.experiments.study import Study
-from contourslam.report.config_file import config_text
 from contourslam.report.page.markup import Section, definitions, folded, heading, paragraph, verbatim
 from contourslam.report.provenance import machine, software
+from contourslam.settings_file import settings_text
 
 
 def section(study: Study, command: str) -> Section:
@@ -23,8 +23,8 @@ def section(study: Study, command: str) -> Section:
         heading("Run, versions and machine"),
         definitions(terms),
         heading("Configuration"),
-        folded("Every setting of the pipeline that was used", verbatim(config_text(comparison.config))),
-        folded("Every setting of the simulation", verbatim(config_text(comparison.simulation))),
+        folded("Every setting of the pipeline that was used", verbatim(settings_text(comparison.config))),
+        folded("Every setting of the simulation", verbatim(settings_text(comparison.simulation))),
         paragraph("metrics.json beside this page holds every number, figures/ the figures as files.", "note"),
     ]
     return Section("reproduce", "Reproduce this", "\n".join(parts))

@@ -1,9 +1,9 @@
 """How to get this run again."""
 
-from contourslam.report.config_file import config_text
 from contourslam.report.page.markup import Section, definitions, folded, heading, paragraph, verbatim
 from contourslam.report.page.run.values import RunValues
 from contourslam.report.provenance import machine, software
+from contourslam.settings_file import settings_text
 
 
 def section(values: RunValues) -> Section:
@@ -13,7 +13,7 @@ def section(values: RunValues) -> Section:
     parts += [
         heading("Run, versions and machine"),
         definitions({"detector": values.result.detector, **skipped, **software(), **machine()}),
-        folded("Every setting that was used", verbatim(config_text(values.config))),
+        folded("Every setting that was used", verbatim(settings_text(values.config))),
         paragraph("metrics.json beside this page holds every number, scans.csv each scan's pose.", "note"),
     ]
     return Section("reproduce", "Reproduce this", "\n".join(parts))
