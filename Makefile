@@ -50,7 +50,7 @@ bench-scale: $(VENV)/.dev ## Measure time, memory and error against distance in 
 bench-ros: $(VENV_ROS)/.ready ## Measure the ROS 2 node beside a robot that is played in real time; two minutes.
 	$(VENV_ROS)/bin/python benchmarks/bench_ros.py --write
 
-bench-robot: $(VENV)/.dev firmware ## Measure the robot in the loop over five seeds with and without faults; half an hour on a quiet machine.
+bench-robot: $(VENV)/.dev firmware ## Measure the robot in the loop over five seeds with and without faults; 25 minutes on a quiet machine.
 	$(BIN)/python benchmarks/bench_robot.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.

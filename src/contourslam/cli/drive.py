@@ -85,7 +85,7 @@ class Drive:
             stack.callback(live_map.close)
             camera = None if config.camera is None else (config.camera.model, config.camera.T_base_camera)
             writer = stack.enter_context(
-                RecordingWriter(self.output / "recording", lidar_mount=config.lidar.mount, camera=camera)
+                RecordingWriter(self.output / "recording", lidar_mount=config.lidar.place, camera=camera)
             )
             status = _Status(robot, live_map)
             journey = Journey(robot, live_map, writer, watch=status.show)

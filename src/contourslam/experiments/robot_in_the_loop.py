@@ -155,7 +155,7 @@ def _drive(
     if recording is not None:
         camera = parts.camera
         seen = None if camera is None else (camera.model, camera.T_base_camera)
-        writer = stack.enter_context(RecordingWriter(recording, lidar_mount=parts.lidar.mount, camera=seen))
+        writer = stack.enter_context(RecordingWriter(recording, lidar_mount=parts.lidar.place, camera=seen))
     robot = stack.enter_context(Robot(opened))
     journey = Journey(robot, live_map, writer, watch=watch)
     for event in robot.wait_until_ready(stopped):

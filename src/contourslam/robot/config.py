@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.geometry.rigid import from_planar
 from contourslam.settings_file import read_settings, write_settings
 
 Floats = NDArray[np.float64]
@@ -107,8 +108,13 @@ class LidarPart:
 
     @property
     def mount(self) -> tuple[float, float, float]:
-        """``T_base_lidar``: x (m), y (m), yaw (rad)."""
+        """``T_base_lidar`` in the plane: x (m), y (m), yaw (rad)."""
         return self.x, self.y, math.radians(self.yaw_deg)
+
+    @property
+    def place(self) -> Floats:
+        """``T_base_lidar`` with its height above the floor, shape (4, 4), m."""
+        return from_planar(np.array(self.mount), self.height)
 
 
 @dataclass(frozen=True, slots=True)
