@@ -32,6 +32,8 @@ def test_what_a_file_leaves_out_keeps_its_default(tmp_path):
         ("slam: {walls: 3}", "slam.walls must be true or false"),
         ("lidar: {sigma_range: -1}", "sigma_range must be a positive"),
         ("lidar: {sigma_range: wide}", "lidar.sigma_range must be a finite number"),
+        ("lidar: {sigma_range: .inf}", "lidar.sigma_range must be a finite number"),
+        (f"lidar: {{sigma_range: 1{'0' * 400}}}", "lidar.sigma_range must be a finite number"),
         ("contour: {min_points: 4.5}", "contour.min_points must be a whole number"),
         ("contour: {min_points: true}", "contour.min_points must be a whole number"),
         ("slam: {association: best}", "slam.association must be one of nearest"),

@@ -3,7 +3,7 @@
 import dataclasses
 import difflib
 import io
-import math
+import sys
 import types
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -146,7 +146,7 @@ def _value(kind: Any, value: Any, place: str) -> Any:
         if value not in get_args(kind):
             raise ConfigError(f"{place} must be one of {', '.join(map(str, get_args(kind)))}, got {value!r}")
         return value
-    if kind is float and type(value) in (int, float) and math.isfinite(value):
+    if kind is float and type(value) in (int, float) and abs(value) <= sys.float_info.max:
         return float(value)
     if kind is float or type(value) is not kind:  # not isinstance: True is an int, too
         raise ConfigError(f"{place} must be {_WANTED[kind]}, got {value!r}")

@@ -14,7 +14,7 @@ Failure = Callable[..., str]
 def test_an_unknown_command_lists_the_commands(failure: Failure) -> None:
     said = failure("rnu", code=2)
     assert "'rnu'" in said
-    assert "simulate, info, detect, run, grid, evaluate, compare" in said
+    assert "simulate, info, detect, run, view, grid, scene, evaluate, compare" in said
 
 
 def test_no_command_at_all_is_wrong_usage(failure: Failure) -> None:

@@ -92,6 +92,12 @@ def test_the_scene_of_a_run_is_in_its_folder_and_on_its_page(result, capsys):
     assert (result / "index.html").read_text().count('id="scene"') == 1
 
 
+def test_the_recording_of_a_drive_is_found_in_its_own_folder(result):
+    (result.parent / "drive").rename(result / "recording")
+    write_text(result / "metrics.json", json.dumps({"command": f"contourslam drive -o {result} --keys"}))
+    assert main(["scene", str(result), *OPTIONS]) == 0
+
+
 def test_a_folder_without_a_kept_map_gives_its_walls(result):
     (result / "map.cmap").unlink()
     assert main(["scene", str(result), *OPTIONS]) == 0

@@ -85,5 +85,6 @@ def test_with_a_camera_the_drive_is_the_same_and_pictures_are_in_it(
         if isinstance(one, LaserScan):
             assert one.ranges.tobytes() == two.ranges.tobytes()
     assert [picture.stamp for picture in recording.pictures()] == [0.0, 0.5, 1.0]
-    assert recording.camera is not None and recording.camera[0].field_of_view_deg == 220.0
-    assert plain.camera is None
+    seen = recording.camera()
+    assert seen is not None and seen[0].field_of_view_deg == 220.0
+    assert plain.camera() is None

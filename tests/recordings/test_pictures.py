@@ -56,8 +56,8 @@ def test_pictures_and_their_camera_come_back(tmp_path: Path, messages: list[Mess
         assert list(recording.pictures()) == pictures
     assert recording.skipped_pictures == {}
     assert len(list(recording.messages())) == len(messages)
-    assert recording.camera is not None and recording.T_base_lidar is not None
-    model, place = recording.camera
+    assert recording.camera() is not None and recording.T_base_lidar is not None
+    model, place = recording.camera()
     assert model == MODEL
     np.testing.assert_allclose(place, PLACE, atol=1e-12)
     np.testing.assert_allclose(recording.T_base_lidar, lidar, atol=1e-12)
@@ -68,7 +68,7 @@ def test_pictures_and_their_camera_come_back(tmp_path: Path, messages: list[Mess
 def test_a_recording_without_pictures_or_camera_says_so(tmp_path: Path, messages: list[Message]) -> None:
     write_recording(tmp_path / "run", messages, lidar_mount=(0.2, 0.0, 0.1))
     recording = open_recording(tmp_path / "run")
-    assert list(recording.pictures()) == [] and recording.camera is None
+    assert list(recording.pictures()) == [] and recording.camera() is None
     np.testing.assert_allclose(recording.T_base_lidar, from_planar((0.2, 0.0, 0.1)), atol=1e-12)
     with pytest.raises(RecordingError, match="holds no pictures"):
         open_pictures(tmp_path / "run")

@@ -72,7 +72,7 @@ class Scene:
             raise ResultError(f"{missing}; `contourslam run` writes it") from missing
         path = self.recording or _recording_of(self.folder, saved)
         recording = open_recording(path)
-        lens = _lens(recording, self.robot)
+        lens = _lens(recording, self.robot, self.picture_topic)
         damage: list[RecordingError] = []
 
         def undamaged() -> "Iterator[Picture]":
@@ -130,8 +130,11 @@ def _map(folder: Path) -> "SavedMap":
 
 
 def _recording_of(folder: Path, saved: "SavedMap") -> Path:
-    """The recording that the run's command names, if it is still there."""
+    """The recording in the folder, where a drive left it, or that the run's command names, if it is still there."""
     from contourslam.report.result_folder import read_metrics
+
+    if (folder / "recording").exists():
+        return folder / "recording"
 
     words = shlex.split(str(read_metrics(folder / "metrics.json").get("command", "")))
     name = saved.about.get("recordings", "").splitlines()[-1:]
@@ -142,24 +145,25 @@ def _recording_of(folder: Path, saved: "SavedMap") -> Path:
     raise ResultError(f"{folder}: the recording that it was made from{mapped} is not found; name it with --recording")
 
 
-def _lens(recording: "Recording", robot: Path | None) -> "Lens":
+def _lens(recording: "Recording", robot: Path | None, topic: str | None) -> "Lens":
     from contourslam.scene.lens import Lens
 
     if robot is not None:
         from contourslam.robot.config import load_robot
 
-        camera = load_robot(robot).camera
-        if camera is None:
+        part = load_robot(robot).camera
+        if part is None:
             raise ConfigError(f"{robot}: names no camera; `contourslam calibrate camera` finds its lens")
-        return Lens(camera.model, camera.T_base_camera)
-    if recording.camera is None:
-        if next(recording.pictures(), None) is None:
+        return Lens(part.model, part.T_base_camera)
+    camera = recording.camera(topic)
+    if camera is None:
+        if next(recording.pictures(topic), None) is None:
             raise RecordingError(_no_pictures(recording))
         raise RecordingError(
             f"{recording.path}: does not say what its camera's lens is and where it sits; give both with --robot "
             f"robot.yaml, as `contourslam calibrate camera` and `calibrate extrinsics` write it; {_topics(recording)}"
         )
-    return Lens(*recording.camera)
+    return Lens(*camera)
 
 
 def _no_pictures(recording: "Recording") -> str:

@@ -75,7 +75,7 @@ class Simulate:
             make_way(self.output, overwrite=self.overwrite)
             with Bar("simulating") as bar:
                 run = simulate(room, config, self.seed, progress=bar.to)
-            write_recording(self.output, run.messages(), lidar_mount=run.lidar_mount)
+            write_recording(self.output, run.messages(), lidar_mount=run.lidar_place)
         if self.picture is not None:
             render_room(room, self.picture)
         seconds = float(run.odometry.stamps[-1])

@@ -12,6 +12,7 @@ from contourslam.errors import ConfigError
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+_MOST_PIXELS = 2**26  # what a file says is not believed beyond
 _STEPS = 12  # of Newton's method, which starts within a part in a thousand of the answer
 _CLOSE = 1e-10  # in units of the plane at distance 1; 1e-7 pixels
 _BEYOND = math.radians(3.0)  # how far beyond the field of view a ray is still told, so that its edge is not lost
@@ -70,6 +71,8 @@ class FisheyeModel:
             raise ConfigError(f"a fisheye model has a value that is no finite number: {values}")
         if not (self.width > 0 and self.height > 0 and self.fx > 0.0 and self.fy > 0.0 and self.xi >= 0.0):
             raise ConfigError("a fisheye model needs width, height, fx and fy above 0 and xi of at least 0")
+        if self.width * self.height > _MOST_PIXELS:
+            raise ConfigError(f"a fisheye model of {self.width:g} x {self.height:g} pixels is larger than any camera's")
         if not 0.0 < self.field_of_view_deg < 360.0:
             raise ConfigError(f"field_of_view_deg must lie between 0 and 360, got {self.field_of_view_deg:g}")
         rises = math.degrees(self._radii[0][-1])

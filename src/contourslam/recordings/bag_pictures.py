@@ -75,7 +75,7 @@ class BagPictures:
                     skip.add(f"{name}: {str(error).removeprefix('a picture: ')}", f"message {number}")
 
     def camera(self, base: str, topic: str | None = None) -> Camera | None:
-        """Find the model of the camera and its place on the robot; see :attr:`Recording.camera`."""
+        """Find the model of the camera and its place on the robot; see :meth:`Recording.camera`."""
         with suppress(RecordingError):
             name = self._choose(topic)
             if name is None:

@@ -117,9 +117,14 @@ class Recording(ABC):
         """
         return iter(())
 
-    @property
-    def camera(self) -> Camera | None:
-        """Model of the fisheye camera and its place ``T_base_camera`` (4, 4), where the recording says both."""
+    def camera(self, topic: str | None = None) -> Camera | None:
+        """Give the model of the fisheye camera and its place ``T_base_camera`` (4, 4), where the recording says both.
+
+        Parameters
+        ----------
+        topic : str, optional
+            Of its pictures, as :meth:`pictures` takes it.
+        """
         return None
 
     @property

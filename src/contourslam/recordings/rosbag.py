@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -95,10 +94,9 @@ class BagRecording(Recording):
         """See :meth:`Recording.wheel_readings`."""
         return read_wheels(self._storage, self.skipped_wheels)
 
-    @cached_property
-    def camera(self) -> Camera | None:
-        """See :attr:`Recording.camera`."""
-        return self._pictures.camera(self._base)
+    def camera(self, topic: str | None = None) -> Camera | None:
+        """See :meth:`Recording.camera`."""
+        return self._pictures.camera(self._base, topic)
 
     @property
     def start(self) -> float | None:

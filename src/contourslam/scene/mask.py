@@ -15,6 +15,7 @@ _DRIVEN = 1.5  # m between the farthest of them
 _STILL, _NOISE = 0.12, 2.0  # a pixel that varies by less than a part of its brightness and this, of 255, is the robot's
 _FOOTPRINT = 0.8  # m; a floor farther off may well be the same everywhere
 _MARGIN = 2  # pixels
+_WIDE = 800  # pixels; of larger pictures each second is looked at, or third
 
 
 def robot_mask(views: tuple[View, ...], lens: Lens) -> Bools:
@@ -38,17 +39,23 @@ def robot_mask(views: tuple[View, ...], lens: Lens) -> Bools:
     places = np.array([view.pose[:2] for view in chosen])
     if len(chosen) < _FEWEST or np.ptp(places, axis=0).max() < _DRIVEN:
         return nothing
-    grey = [cv2.cvtColor(p, cv2.COLOR_RGB2GRAY) for view in chosen if (p := decode(view.picture, model)) is not None]
+    each = -(-max(model.width, model.height) // _WIDE)
+    grey = [
+        cv2.GaussianBlur(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), (5, 5), 0)[::each, ::each]
+        for view in chosen
+        if (pixels := decode(view.picture, model)) is not None
+    ]
     if len(grey) < _FEWEST:
         return nothing
-    stack = np.stack([cv2.GaussianBlur(image, (5, 5), 0) for image in grey]).astype(np.float32)
+    stack = np.stack(grey).astype(np.float32)
     stack *= (stack.mean() / np.maximum(stack.mean(axis=(1, 2)), 1.0))[:, None, None]
     low, middle, high = np.percentile(stack, (10, 50, 90), axis=0)
     still = high - low < _STILL * middle + _NOISE
-    near = still & _under(lens)
+    near = still & _under(lens)[::each, ::each]
     size = 2 * _MARGIN + 1
     grown = cv2.dilate(cv2.morphologyEx(near.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))), np.ones((size, size)))
-    return np.asarray(grown, dtype=np.bool_)
+    whole = np.repeat(np.repeat(grown, each, axis=0), each, axis=1)[: model.height, : model.width]
+    return np.asarray(whole, dtype=np.bool_)
 
 
 def _under(lens: Lens) -> Bools:
