@@ -15,8 +15,10 @@ def test_what_others_reach_is_known_too(host: str) -> None:
 
 def test_on_loopback_a_foreign_name_is_refused_so_that_rebinding_fails() -> None:
     access = Access(loopback=True)
-    assert all(access.knows(host) for host in ("127.0.0.1:8642", "localhost:1", "[::1]:8642", "localhost"))
-    for host in ("evil.example:8642", "127.0.0.1.evil.example:80", "evil.example", "", None, "localhost:1:2"):
+    known = ("127.0.0.1:8642", "127.0.0.2:8642", "localhost:1", "[::1]:8642", "localhost")
+    assert all(access.knows(host) for host in known)
+    others = ("evil.example:8642", "127.0.0.1.evil.example:80", "evil.example", "192.168.1.7:8642", "localhost:1:2")
+    for host in (*others, "", None):
         assert not access.knows(host)
 
 

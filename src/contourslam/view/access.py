@@ -6,8 +6,6 @@ import secrets
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-LOCAL_NAMES = ("localhost", "127.0.0.1", "[::1]")
-
 
 def is_loopback(host: str) -> bool:
     """Whether what listens there can be reached from this machine alone."""
@@ -56,7 +54,7 @@ class Access:
         """Whether a request came under a name that is this server's; with a token, any is."""
         if host is None:
             return False
-        return not self.loopback or host.rpartition(":")[0] in LOCAL_NAMES or host in LOCAL_NAMES
+        return not self.loopback or any(is_loopback(name.strip("[]")) for name in (host.rpartition(":")[0], host))
 
     def same_origin(self, origin: str | None, host: str | None) -> bool:
         """Whether a websocket is asked for by the page itself; what is no browser sends no origin."""

@@ -59,7 +59,7 @@ class ViewServer:
         self._files = load()
         self._lag = lag or Lag()
         self._ready = threading.Event()
-        self._failure: OSError | None = None
+        self._failure: Exception | None = None
         self._loop = asyncio.new_event_loop()
         self._stop = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="view server", daemon=True)
@@ -69,10 +69,10 @@ class ViewServer:
         self._ready.wait()
         if self._failure is not None:
             self._thread.join()
-            why = self._failure.strerror or self._failure
+            why = getattr(self._failure, "strerror", None) or self._failure
             raise ServeError(
-                f"the page cannot be served at {self._host}, port {self.port} ({why}); choose another --port, or 0 for "
-                "any that is free"
+                f"the page cannot be served at {self._host}, port {self.port} ({why}); choose another "
+                "--host, or another --port (0 for any that is free)"
             )
         return self
 
@@ -102,7 +102,7 @@ class ViewServer:
                 self._meet, self._host, self.port, process_request=self._answer, compression=None, logger=_LOG,
                 max_size=LARGEST_REQUEST, max_queue=16, write_limit=BUFFER, close_timeout=1.0, server_header=None,
             )  # fmt: skip
-        except OSError as error:
+        except (OSError, ValueError) as error:  # a name that IDNA refuses is a ValueError
             self._failure = error
             return
         self.port = next(iter(server.sockets)).getsockname()[1]
