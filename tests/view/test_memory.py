@@ -44,9 +44,8 @@ def test_maps_are_found_as_they_were_at_a_time_and_stay_within_their_budget() ->
         memory.add_map(0, float(i), i, bytes(100))
         memory.add_map(1, float(i), i, bytes(100))
         assert memory.map_at(0, 1e9).elapsed == i
-    found = memory.map_at(1, 50.0)
-    assert found.elapsed <= 50.0
-    assert found.elapsed > 20.0
+    for lane in (0, 1):
+        assert 20.0 < memory.map_at(lane, 50.0).elapsed <= 50.0
     assert memory.map_at(1, -1.0).elapsed < 20.0  # the first there is
     assert sum(len(m.message) for maps in memory._maps for m in maps) <= 3000
 

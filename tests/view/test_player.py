@@ -5,12 +5,14 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from contourslam.config import Config
+from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError, RecordingError
 from contourslam.replay import replay
 from contourslam.scan import LaserScan
+from contourslam.slam.result import ScanUpdate
 from contourslam.view.knots import UNIT
 from contourslam.view.moment import trace_of
+from contourslam.view.stories import KEPT, LANDMARKS, Stories
 
 BACK_ENDS = ["ekf", pytest.param("graph", marks=pytest.mark.skipif(find_spec("gtsam") is None, reason="no GTSAM"))]
 
@@ -131,3 +133,30 @@ def test_a_corner_has_a_story(replayed) -> None:
     assert np.isfinite(off).any()
     assert one.show.story(0, 10**6)["times"] == ()
     assert one.show.story(7, 0) == {}
+
+
+def test_nothing_is_mapped_ahead_once_the_recording_has_ended(replayed) -> None:
+    one = replayed(5)
+    one.pace.hurry(1e9)
+    assert one.show.status()["hurries_to"] == 1e9
+    one.player.run()
+    assert one.player.state == "finished"
+    assert one.show.status()["hurries_to"] is None
+
+
+def test_the_page_knows_the_bound_that_landmarks_are_dropped_at(replayed) -> None:
+    config = Config(back_end="ekf", slam=SlamConfig(max_false_negative_rate=0.4))
+    assert replayed(3, config=config).show.about["max_false_negative_rate"] == 0.4
+
+
+def test_of_stories_and_of_each_the_newest_part_is_kept() -> None:
+    stories = Stories()
+    nothing = ScanUpdate(0.0, np.zeros(3), np.eye(3), 1, 0, (), (), (), (), 0.0, 0)
+    for i in range(LANDMARKS + 10):
+        stories.take(float(i), replace(nothing, born=(i,)), None)
+    newest = LANDMARKS + 9
+    for i in range(KEPT + 5):
+        stories.take(newest + 1.0 + i, replace(nothing, matched=(newest,)), None)
+    assert stories.story(9)["times"] == ()
+    assert stories.story(10)["times"] == (10.0,)
+    assert stories.story(newest)["times"] == tuple(newest + 6.0 + i for i in range(KEPT))

@@ -89,6 +89,12 @@ def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened) -
     assert f"seen, o {place[3]} " in facts
     page.keyboard.press("Escape")
     assert page.evaluate("contourslam.selected") is None
+    # A map drawn up anew at the same time and with as many knots, as the refined one is, is another to draw.
+    assert page.evaluate(
+        "(() => { const { model, maps } = contourslam, [map] = maps, before = map.ink.key;"
+        "model.take({ kind: 'map', lane: 0, arrays: model.maps[0] });"
+        "map.draw(model, { ink: true }, null); return map.ink.key !== before; })()"
+    )
 
 
 def test_four_detectors_stand_side_by_side(served, opened) -> None:
@@ -102,6 +108,13 @@ def test_four_detectors_stand_side_by_side(served, opened) -> None:
         name.replace("_", " ") for name in names
     ]
     assert all(inked(page, lane) > 10 for lane in range(4))
+    # Another server with as many lanes at the same address: the connection is opened anew, and so are the maps.
+    page.evaluate(
+        "(() => { const { about, unit } = contourslam.model;"
+        "const lanes = [...about.lanes].reverse();"
+        "contourslam.link.handlers.message({ kind: 'hello', unit, about: { ...about, lanes } }); })()"
+    )
+    assert page.locator("figcaption b").all_inner_texts() == [name.replace("_", " ") for name in names[::-1]]
 
 
 def test_the_time_line_goes_back_at_once_and_play_goes_on_from_there(served, opened) -> None:

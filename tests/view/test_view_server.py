@@ -197,6 +197,11 @@ def test_a_port_that_is_taken_is_a_known_failure(replayed) -> None:
         pass
 
 
+def test_a_host_that_is_none_is_a_known_failure(replayed) -> None:
+    with pytest.raises(ServeError, match="--host"), ViewServer(replayed(3).show, host="a..b"):
+        pass
+
+
 def test_lag_is_from_the_pose_to_the_picture() -> None:
     lag = Lag()
     assert lag.summary() == {"median": None, "most": None}
@@ -207,12 +212,16 @@ def test_lag_is_from_the_pose_to_the_picture() -> None:
 
 def test_where_the_way_is_thinned_out_a_page_gets_it_anew(served) -> None:
     one, server = served(40, memory=Memory(1, knots=5), pace=Pace(40.0))
+    one.show.memory.add_event(0.0, "trouble", "early")
     hellos = count = 0
+    told: list[str] = []
     with page(server) as client:
         while True:
             message = read(client)
             if message["kind"] == "hello":
-                hellos, count = hellos + 1, 0
+                hellos, count, told = hellos + 1, 0, []
+            elif message["kind"] == "status":
+                told += [event["text"] for event in message["events"]]
             elif message["kind"] == "knots":
                 assert message["first"] == count
                 count += message["count"]
@@ -221,4 +230,5 @@ def test_where_the_way_is_thinned_out_a_page_gets_it_anew(served) -> None:
                 if message["index"] == 39:
                     break
     assert hellos >= 2
+    assert told.count("early") == 1  # a page forgets what happened, too
     assert message["knots"] == count == len(one.show.memory.knots(0)) <= 5

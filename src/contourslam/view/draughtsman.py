@@ -57,7 +57,7 @@ class Draughtsman:
         began = self._clock()
         scans = self._memory.knot_scans()
         arrays = self._lanes[number].draw(scans)
-        message = pack("map", {"lane": number, "elapsed": elapsed}, arrays)
+        message = pack("map", {"lane": number}, arrays)
         self._memory.add_map(number, elapsed, len(scans), message)
         self._wanted[number] = self._urgent[number] = False
         self._ended[number] = self._clock()

@@ -159,8 +159,6 @@ class Lane:
             "failed": corners.failed.astype(np.int32),
             "wall_ids": walls.ids.astype(np.int32),
             "walls": walls.end_points.reshape(-1, 4).astype(np.float32),
-            "wall_observed": walls.observed.astype(np.int32),
-            "wall_failed": walls.failed.astype(np.int32),
             "path": path.astype(np.float32),
             "loops": ends.reshape(-1, 4).astype(np.float32),
             "loop_methods": np.array([METHODS.index(loop.method) for loop in self.loops], dtype=np.uint8),

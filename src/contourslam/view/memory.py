@@ -22,7 +22,7 @@ class MapDrawn:
     Attributes
     ----------
     number : int
-        Counts all of a memory; no two are alike.
+        Counts those of its lane, from 1.
     elapsed : float
         s.
     knots : int
@@ -66,7 +66,7 @@ class Memory:
         self._maps: list[list[MapDrawn]] = [[] for _ in range(lanes)]
         self._latest_map: list[MapDrawn | None] = [None] * lanes
         self._map_stride, self._map_bytes = 1, 0
-        self._drawn = 0
+        self._drawn = [0] * lanes
         self._events: list[dict[str, Any]] = []
         self._lost_events = 0
         self.epoch = 0
@@ -105,10 +105,10 @@ class Memory:
     def add_map(self, lane: int, elapsed: float, knots: int, message: bytes) -> None:
         """Take in a map; the newest is always there."""
         with self._lock:
-            self._drawn += 1
-            drawn = MapDrawn(self._drawn, elapsed, knots, message)
+            self._drawn[lane] += 1
+            drawn = MapDrawn(self._drawn[lane], elapsed, knots, message)
             self._latest_map[lane] = drawn
-            if self._drawn % self._map_stride:
+            if self._drawn[lane] % self._map_stride:
                 return
             self._maps[lane].append(drawn)
             self._map_bytes += len(message)

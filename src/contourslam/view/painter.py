@@ -46,9 +46,7 @@ class Painter:
         header = {
             "index": moment.index,
             "elapsed": moment.elapsed,
-            "stamp": moment.lanes[0].update.stamp,
             "knots": knots,
-            "odometry": moment.odometry,
             "truth": moment.truth,
             "lanes": lanes,
         }
@@ -56,33 +54,25 @@ class Painter:
 
     def _lane(self, number: int, moment: Moment, lane: LaneMoment, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
         detector, update = self._detectors[number], lane.update
-        found = find_landmarks(moment.trace.contours(), detector, self._config)
-        corners = found.corners
+        found = find_landmarks(moment.trace.contours(), detector, self._config, walls=False)
         own: dict[str, NDArray[Any]] = {
             "curve": found.curve.points.astype(np.float32),
             "curve_starts": found.curve.starts.astype(np.int32),
             "response": found.response.astype(np.float32),
             "candidates": found.candidates.astype(np.int32),
-            "corners": corners.positions.astype(np.float32),
-            "sides": np.column_stack([corners.directions, corners.openings, corners.sides]).astype(np.float32),
-            "walls": found.walls.end_points.reshape(-1, 4).astype(np.float32),
+            "corners": found.corners.positions.astype(np.float32),
         }
         seen = lane.sighting
         if seen is not None:
-            own |= {"seen_ids": seen.ids, "seen": seen.points, "innovations": seen.innovations}
+            own |= {"seen_ids": seen.ids, "seen": seen.points}
         arrays |= {f"{name}_{number}": values for name, values in own.items()}
         return {
             "pose": update.pose,
             "covariance": _upper(update.covariance),
             "nis": update.nis,
             "dof": update.nis_dof,
-            "quality": update.quality,
-            "corners": update.corners,
-            "walls": update.walls,
             "matched": update.matched,
             "missed": update.missed,
-            "born": update.born,
-            "dropped": update.dropped,
             "threshold": detector.threshold,
             "looked": seen is not None and seen.stamp == update.stamp,
             "seen_corners": 0 if seen is None else seen.corners,

@@ -89,6 +89,7 @@ class Replayed:
             "duration": duration,
             "mount": mount,
             "can_pause": True,
+            "max_false_negative_rate": config.slam.max_false_negative_rate,
         }
         painter = Painter(config, self._detectors)
         self.show = Show(about, self._memory, painter, self.pace, self._status, self._story)
@@ -106,7 +107,7 @@ class Replayed:
             "trouble": player.trouble,
             "paused": pace.paused,
             "speed": None if math.isinf(pace.speed) else pace.speed,
-            "hurries_to": pace.hurries_to,
+            "hurries_to": pace.hurries_to if player.state in ("starting", "mapping") else None,
             "reached": pace.reached(),
             "head": 0.0 if newest is None else newest.elapsed,
             "scans": 0 if newest is None else newest.index + 1,

@@ -116,7 +116,7 @@ class Spectator:
         send, memory = self._connection.send, self._show.memory
         if self._epoch != memory.epoch:
             self._epoch, self._knots, self._index = memory.epoch, 0, -1
-            self._maps = [0] * self._lanes
+            self._maps, self._events, self._status_at = [0] * self._lanes, 0, 0.0  # the page forgets all at a hello
             await send(pack("hello", {"about": self._show.about, "unit": UNIT}))
         if now >= self._status_at + STATUS:
             self._status_at = now

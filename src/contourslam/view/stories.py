@@ -8,8 +8,8 @@ from typing import Any
 from contourslam.slam.result import ScanUpdate
 from contourslam.view.moment import Sighting
 
-KEPT = 400  # chances that are kept of each landmark, the newest
-LANDMARKS = 20_000  # whose stories are kept, the newest
+KEPT = 200  # chances that are kept of each landmark, the newest
+LANDMARKS = 2_000  # whose stories are kept, the newest
 SEEN, MISSED, BORN = 1, 0, 2
 
 
@@ -51,4 +51,4 @@ class Stories:
         else:
             events = []
         columns = list(zip(*events, strict=True)) or [(), (), (), ()]
-        return {"times": columns[0], "what": columns[1], "dx": columns[2], "dy": columns[3], "kept": KEPT}
+        return {"times": columns[0], "what": columns[1], "dx": columns[2], "dy": columns[3]}

@@ -15,7 +15,7 @@ export class Ink {
   draw(model, lane, camera, width, height, ratio, rgb) {
     const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
     const map = model.maps[lane], shown = model.shown;
-    const key = `${camera.key()}|${w}x${h}|${rgb}|${map ? map.elapsed : 0}|${map ? map.knots : 0}`;
+    const key = `${camera.key()}|${w}x${h}|${rgb}|${map ? map.version : 0}`;
     if (key === this.key && shown === this.drawn) return this.canvas;
     if (key !== this.key || shown < this.drawn) {
       if (this.counts.length !== w * h) {

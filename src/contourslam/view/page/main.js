@@ -44,8 +44,9 @@ function hello() {
   const { about } = model;
   $("title").textContent = `${about.title} · ${about.back_end === "graph" ? "graph" : "EKF"}`;
   document.title = `${about.title} – contourslam`;
-  const same = maps.length === about.lanes.length;
+  const same = maps.map((map) => map.name).join() === about.lanes.join();
   if (!same) {
+    selected = null;
     maps = about.lanes.map((name, lane) => new LaneMap(lane, name, camera, choose));
     $("lanes").replaceChildren(...maps.map((map) => map.figure));
     $("lanes").dataset.count = $("stage").dataset.count = maps.length;

@@ -25,6 +25,7 @@ export const LAYERS = [
 export class LaneMap {
   constructor(lane, name, camera, chosen) {
     this.lane = lane;
+    this.name = name;
     this.camera = camera;
     this.ink = new Ink();
     this.floor = new Floor();

@@ -38,7 +38,7 @@ export class Model {
     this.inkStarts = new Growing(Int32Array);
     this.inkStarts.push([0]);
     this.maps = [];
-    this.mapVersion = 0;
+    this.mapVersion = 0; // maps taken so far; each carries its number
     this.frame = null;
     this.status = null;
     this.story = null;
@@ -55,8 +55,8 @@ export class Model {
         break;
       case "knots": this.takeKnots(message); break;
       case "map":
-        this.maps[message.lane] = readMap(message);
         this.mapVersion += 1;
+        this.maps[message.lane] = readMap(message, this.mapVersion);
         break;
       case "frame": this.frame = readFrame(message); break;
       case "status":
@@ -124,20 +124,17 @@ export class Model {
   }
 }
 
-function readMap({ elapsed, arrays: a }) {
-  const byId = new Map(), walls = new Map();
+function readMap({ arrays: a }, version) {
+  const byId = new Map();
   a.corner_ids.forEach((id, i) => byId.set(id, i));
-  a.wall_ids.forEach((id, i) => walls.set(id, i));
-  return { elapsed, ...a, byId, wallById: walls, knots: a.path.length / 3 };
+  return { ...a, version, byId, knots: a.path.length / 3 };
 }
 
 function readFrame(message) {
   const { arrays } = message;
   message.lanes.forEach((lane, i) => {
-    for (const name of ["curve", "curve_starts", "response", "candidates", "corners", "sides", "walls", "seen_ids",
-      "seen", "innovations"]) {
-      const found = arrays[`${name}_${i}`];
-      lane[name === "corners" ? "cornerPoints" : name === "walls" ? "wallEnds" : name] = found;
+    for (const name of ["curve", "curve_starts", "response", "candidates", "corners", "seen_ids", "seen"]) {
+      lane[name] = arrays[`${name}_${i}`];
     }
   });
   return { ...message, points: arrays.points, starts: arrays.starts };

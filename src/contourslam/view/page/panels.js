@@ -7,7 +7,6 @@ import { drawResponse, drawScan } from "./scan_chart.js";
 import { drawSeries, smooth } from "./series.js";
 
 const $ = (id) => document.getElementById(id);
-const LIMIT = 0.7; // false-negative rate beyond which a landmark is dropped
 const NIS_BAND = [0.35, 1.95]; // 95 % of the mean of eight three-dimensional values
 
 const text = (tag, content, parent, more = {}) => {
@@ -100,7 +99,7 @@ function corner(model, selected) {
   }
   const story = model.story;
   if (!story || story.id !== selected.id || story.lane !== selected.lane) return;
-  drawLife($("cornerhistory"), story, model.frame.elapsed, LIMIT);
+  drawLife($("cornerhistory"), story, model.frame.elapsed, model.about.max_false_negative_rate);
   drawInnovations($("cornerinnovations"), story, model.frame.elapsed);
 }
 

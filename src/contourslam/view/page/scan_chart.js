@@ -47,8 +47,8 @@ export function drawScan(canvas, frame, mount) {
   frame.lanes.forEach((lane, number) => {
     ctx.strokeStyle = laneColour(number);
     ctx.lineWidth = 1.6;
-    for (let i = 0; i < lane.cornerPoints.length; i += 2) {
-      const [x, y] = at(lane.cornerPoints[i], lane.cornerPoints[i + 1]);
+    for (let i = 0; i < lane.corners.length; i += 2) {
+      const [x, y] = at(lane.corners[i], lane.corners[i + 1]);
       ctx.beginPath();
       ctx.arc(px(y), py(x), 5 + 2.5 * number, 0, 2 * Math.PI);
       ctx.stroke();
