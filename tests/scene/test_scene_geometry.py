@@ -10,13 +10,14 @@ from painted_room import BOX, BOX_CORNERS, CORNERS, DEEP, HIGH, WIDE
 
 from contourslam.errors import MapError
 from contourslam.maps.saved_map import SavedMap
+from contourslam.scene.atlas import BORDER, LARGEST
 from contourslam.scene.behind import walls_behind
 from contourslam.scene.bodies import bodies, lids
 from contourslam.scene.facets import find_facets
 from contourslam.scene.floor import rectangles, seen_floor
 from contourslam.scene.occlusion import occluders, visible
 from contourslam.scene.raising import SceneOptions, raise_surfaces
-from contourslam.scene.surface import TexelGrid, upright
+from contourslam.scene.surface import SIDE, TexelGrid, upright
 from contourslam.scene.walls import clean_walls, join_ends, square_up
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
@@ -149,8 +150,16 @@ def test_the_floor_covers_the_room_and_goes_on_under_a_box_and_not_behind_a_door
     walls = [wall for wall in room_surfaces(*box_surfaces()) if wall.name != "wall-1"]
     walls.append(upright("wall-1", "wall", np.array([WIDE, DEEP]), np.array([WIDE, 1.0]), HIGH))  # open below
     way = np.array([[1.0, 1.0, 0.0], [3.0, 2.5, 0.0], [1.0, 2.5, 0.0], [3.0, 0.5, 0.0]])
-    (floor,) = seen_floor(way, occluders(tuple(walls)), 8.0, 0.02)
+    (floor,) = seen_floor(way, occluders(tuple(walls)), 8.0, 0.02, 10.0)
     assert floor.area == pytest.approx(WIDE * DEEP, rel=0.03)
+
+
+def test_the_cells_of_a_huge_floor_are_larger(monkeypatch):
+    monkeypatch.setattr("contourslam.scene.floor._MOST_CELLS", 2000)
+    way, blocks = np.array([[1.0, 1.0, 0.0], [3.0, 2.5, 0.0]]), occluders(room_surfaces())
+    (whole,) = seen_floor(way, blocks, 8.0, 0.02, 10.0)
+    assert np.diff(whole.parts.reshape(-1, 2, 2), axis=1).min() > 0.95 * math.sqrt(WIDE * DEEP / 2000)
+    assert whole.area == pytest.approx(WIDE * DEEP, rel=0.1)
 
 
 @given(st.lists(st.lists(st.booleans(), min_size=1, max_size=7), min_size=1, max_size=7))
@@ -234,3 +243,12 @@ def test_a_map_of_walls_alone_is_raised_with_its_floor():
     assert {s.height for s in surfaces[:4]} == {2.2}
     for surface in surfaces[:4]:  # each is seen from inside
         assert surface.normal @ (np.array([2.0, 1.5, 1.0]) - surface.origin) > 0
+
+
+def test_no_piece_is_larger_than_a_sheet_has_room_for():
+    walls = wall_map(*[(CORNERS[(n + 1) % 4], CORNERS[n]) for n in range(4)])
+    fine = SceneOptions(height=1.0, texel=0.0003)
+    surfaces = raise_surfaces(SavedMap(no_corners(), walls), np.array([[1.0, 1.0, 0.0]]), fine)
+    texels = SIDE * TexelGrid.over(surfaces, fine.texel).shapes
+    assert texels.max() <= LARGEST - 2 * BORDER
+    assert sum(s.area for s in surfaces if s.kind == "floor") == pytest.approx(WIDE * DEEP, rel=0.1)

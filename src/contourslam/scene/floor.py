@@ -15,10 +15,10 @@ Bools = NDArray[np.bool_]
 _RAYS = 720
 _APART = 0.4  # m between the places that the floor is looked at from
 _BEHIND = 0.02  # m by which it goes on below a wall
-_MOST = 40.0  # m along a side of one piece
+_MOST_CELLS = 20_000_000
 
 
-def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tuple[Surface, ...]:
+def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float, longest: float) -> tuple[Surface, ...]:
     """Lay a floor wherever something stands in sight of the way, and where blocks shut it in.
 
     Parameters
@@ -30,7 +30,9 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
     reach : float
         How far the floor is looked at from each place; it is left out where no block ends the sight, m.
     cell : float
-        Side of the squares that it is made of, m.
+        Side of the squares that it is made of, m; larger where there would be more than some 20 million.
+    longest : float
+        Side of a piece at most, m.
 
     Returns
     -------
@@ -44,9 +46,10 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
         return ()
     angles = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
     rings = [sights(place, angles, blocks, reach) for place in places]
-    low = np.min([ring.min(axis=0) for ring in rings], axis=0) - 2.0 * cell
-    size = np.max([ring.max(axis=0) for ring in rings], axis=0) - low
-    columns, rows = (int(n) for n in np.ceil(size / cell) + 2)
+    low, high = np.min([r.min(axis=0) for r in rings], axis=0), np.max([r.max(axis=0) for r in rings], axis=0)
+    cell = max(cell, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
+    low -= 2.0 * cell
+    columns, rows = (int(n) for n in np.ceil((high - low) / cell) + 2)
     seen = np.zeros((rows, columns), np.uint8)
     for ring in rings:
         cv2.fillPoly(seen, [_fixed(ring, low, cell)], 1, shift=4)
@@ -56,7 +59,7 @@ def seen_floor(poses: Floats, blocks: Floats, reach: float, cell: float) -> tupl
     cv2.floodFill(shut, None, (0, 0), 2)
     shut_in = cv2.dilate((shut == 0).astype(np.uint8), np.ones((5, 5), np.uint8))  # and under the walls about it
     seen[(np.asarray(shut_in) > 0) & (shut != 2)] = 1  # under furniture there is a floor too
-    step = max(int(_MOST / cell), 1)
+    step = max(int(longest / cell), 1)
     floors: list[Surface] = []
     for row in range(0, rows, step):
         for column in range(0, columns, step):

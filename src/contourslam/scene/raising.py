@@ -80,14 +80,19 @@ def raise_surfaces(saved: SavedMap, poses: Floats, options: SceneOptions) -> tup
     if not walls:
         raise MapError("the map holds no walls, of which a scene is made; map the recording again with --walls")
     facets, columns = find_facets(points, keys, walls)
-    longest = min(30.0, options.texel * (LARGEST - 2 * BORDER - SIDE))
+    longest = _longest(options)
     surfaces = []
     for name, segment in _short(join_ends(walls + square_up(facets, walls)) + columns, longest):
         kind = name.partition("-")[0]
         height = options.height if kind == "wall" else options.furniture_height
         surfaces.append(upright(name, kind, segment[0], segment[1], height))
     upright_ones = tuple(surfaces)
-    return upright_ones + seen_floor(poses, occluders(upright_ones), _REACH, _FLOOR_CELL)
+    return upright_ones + seen_floor(poses, occluders(upright_ones), _REACH, _FLOOR_CELL, longest)
+
+
+def _longest(options: SceneOptions) -> float:
+    """Longest side of a piece that a sheet has room for, m."""
+    return min(30.0, options.texel * (LARGEST - 2 * BORDER - SIDE))
 
 
 def _short(segments: Named, longest: float) -> Named:
@@ -134,7 +139,7 @@ def cut_to_height(
     walls = [*whole_walls(looked_at, heights), *closed]
     cut = [s.cut(_settled(s, h, walls, options)) for s, h in zip(looked_at, heights, strict=True)]
     standing = (*cut, *(s.cut(options.height) for s in closed))
-    floors = seen_floor(poses, occluders(standing), _REACH, _FLOOR_CELL)
+    floors = seen_floor(poses, occluders(standing), _REACH, _FLOOR_CELL, _longest(options))
     return (*standing, *lids(standing, options.height), *floors)
 
 
