@@ -96,6 +96,6 @@ def room_textures(room: Room, seed: int = 0) -> RoomTextures:
     Returns
     -------
     RoomTextures
-        4 mm to a pixel; coarser in large rooms, so that all textures have some 12 million pixels at most.
+        5 mm to a pixel; coarser in large rooms, so that all textures have some 9 million pixels at most.
     """
     return RoomTextures(room, paint(room, seed))
