@@ -19,7 +19,7 @@ namespace {
 constexpr uint8_t PERIODS_PER_STATE = protocol::STATE_MS * 1000 / ticker::PERIOD_US;
 constexpr uint32_t WATCHDOG = protocol::WATCHDOG_MS * 2000UL;  // half microseconds
 
-enum class Mode : uint8_t { STOPPED, DRIVING, EXPIRED };
+enum class Mode : uint8_t { STOPPED, DRIVING, EXPIRED, STALLED };
 
 Mode mode;
 Gains gains = {GAIN_KP, GAIN_KI, GAIN_KD, GAIN_FEED_FORWARD};
@@ -29,6 +29,7 @@ uint8_t last_sequence;
 
 Speedometer speedometers[2];
 Controller controllers[2];
+StallDetector stalls[2];
 int32_t ticks[2];
 int16_t counts[2];
 float duties[2];
@@ -77,7 +78,9 @@ bool drive(const uint8_t *payload) {
   wanted[LEFT] = message.left;
   wanted[RIGHT] = message.right;
   driven_at = ticker::now();
-  mode = Mode::DRIVING;
+  // Who goes on asking has not noticed that a motor does not turn; only asking for rest ends that.
+  bool rest = message.left == 0 && message.right == 0;
+  if (mode != Mode::STALLED || rest) mode = Mode::DRIVING;
   return true;
 }
 
@@ -99,6 +102,8 @@ void control(const ticker::Sample &sample) {
   // The sample may be a little older than the command.
   if (mode == Mode::DRIVING && (int32_t)(sample.now - driven_at) >= (int32_t)WATCHDOG) stop(Mode::EXPIRED);
   if (mode != Mode::DRIVING) return;
+  for (uint8_t side = 0; side < 2; side++)
+    if (stalls[side].update(ticks[side], duties[side])) return stop(Mode::STALLED);
   for (uint8_t side = 0; side < 2; side++) {
     const Speedometer &wheel = speedometers[side];
     duties[side] = controllers[side].step(wanted[side], wheel.speed(), wheel.moved(), gains);
@@ -124,7 +129,8 @@ void tell(uint32_t time_us) {
   state.flags = (mode == Mode::EXPIRED ? protocol::WATCHDOG : 0) | (reading.answers ? protocol::IMU : 0) |
                 (reading.compass_answers ? protocol::COMPASS : 0) | (battery::low() ? protocol::BATTERY_LOW : 0) |
                 (link::refused() ? protocol::REFUSED : 0) |
-                (encoders::impossible_step() ? protocol::IMPOSSIBLE_STEP : 0);
+                (encoders::impossible_step() ? protocol::IMPOSSIBLE_STEP : 0) |
+                (mode == Mode::STALLED ? protocol::STALLED : 0);
   send(state, protocol::STATE, false);
 }
 

@@ -5,14 +5,16 @@
 namespace protocol {
 
 constexpr uint8_t VERSION = 1;
-constexpr uint8_t FIRMWARE[3] = {1, 0, 0};
+constexpr uint8_t FIRMWARE[3] = {1, 1, 0};
 constexpr uint16_t STATE_MS = 20, WATCHDOG_MS = 300;
 constexpr int32_t FASTEST = 20000;  // ticks/s
 constexpr float LARGEST_GAIN = 100;
 
 enum Type : uint8_t { DRIVE = 0x01, STOP, TUNE, HELLO, STATE = 0x81, ACK, HELLO_REPLY };
 enum Result : uint8_t { OBEYED, UNKNOWN_TYPE, WRONG_LENGTH, OUT_OF_RANGE };
-enum Flag : uint8_t { WATCHDOG = 1, IMU = 2, COMPASS = 4, BATTERY_LOW = 8, REFUSED = 16, IMPOSSIBLE_STEP = 32 };
+enum Flag : uint8_t {
+  WATCHDOG = 1, IMU = 2, COMPASS = 4, BATTERY_LOW = 8, REFUSED = 16, IMPOSSIBLE_STEP = 32, STALLED = 64
+};
 
 struct Head {
   uint8_t type, sequence;

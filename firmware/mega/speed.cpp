@@ -9,6 +9,9 @@ constexpr uint32_t AT_MOST = 40000;         // 20 ms: what has come by then is m
 constexpr int32_t CYCLE = 4;                // ... or a whole cycle of the encoder, whose edges may be uneven
 constexpr uint32_t STANDSTILL = 400000;     // 200 ms without an edge: less than 5 ticks/s
 constexpr float FULL = 1000;                // per mille
+constexpr float NEARLY_FULL = 900;
+constexpr int32_t DITHER = 1;               // an encoder with one dead channel goes to and fro by a tick
+constexpr uint8_t STALL = 500000UL / ticker::PERIOD_US;
 constexpr float DT = ticker::PERIOD_US * 1e-6f;
 constexpr float FOLLOWS = DT / (DT + MOTOR_TIME_CONSTANT);
 }  // namespace
@@ -34,6 +37,15 @@ void Speedometer::update(int32_t count, uint32_t edge, uint32_t now) {
   moved_ = (count - newest_) + (part - part_);
   newest_ = count;
   part_ = part;
+}
+
+bool StallDetector::update(int32_t count, float duty) {
+  if (fabs(duty) < NEARLY_FULL || abs(count - from_) > DITHER) {
+    from_ = count;
+    periods_ = 0;
+    return false;
+  }
+  return ++periods_ >= STALL;
 }
 
 float Controller::step(float wanted, float measured, float moved, const Gains &gains) {

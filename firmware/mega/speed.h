@@ -20,6 +20,17 @@ class Speedometer {
   float moved_ = 0;
 };
 
+// Whether a motor at nearly full power turns nothing: its wheel is blocked, or its encoder is dead and it races unseen.
+class StallDetector {
+ public:
+  // To be called once a period with the count, and the duty in per mille that the motor has had since the call before.
+  bool update(int32_t count, float duty);
+
+ private:
+  int32_t from_ = 0;  // count when it last turned, or had less power
+  uint8_t periods_ = 0;
+};
+
 struct Gains {
   float kp, ki, kd, feed_forward;
 };

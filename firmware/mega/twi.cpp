@@ -55,8 +55,8 @@ Status status() { return state; }
 void give_up() {
   // A part that was cut off in the midst of a byte may hold the data line: clock it out.
   TWCR = 0;
-  digitalWrite(SCL, LOW);
   for (uint8_t i = 0; i < 9; i++) {
+    digitalWrite(SCL, LOW);  // the pull-up of before would make it an output that is high
     pinMode(SCL, OUTPUT);
     delayMicroseconds(5);
     pinMode(SCL, INPUT_PULLUP);

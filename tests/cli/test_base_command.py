@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from contourslam.cli import main
 from contourslam.recordings import WheelReading, write_recording, write_trajectory
 from contourslam.robot.base import self_test
-from contourslam.robot.base.messages import BATTERY_LOW
+from contourslam.robot.base.messages import BATTERY_LOW, STALLED
 from contourslam.robot.base.odometry import arc
 from contourslam.robot.config import BaseConfig, LidarPart, RobotConfig, load_robot, save_robot
 from contourslam.scan import LaserScan, Odometry
@@ -48,6 +49,12 @@ def test_base_warns_of_a_low_battery(device: MegaDevice, capsys: pytest.CaptureF
     assert "charge it" in said.err
 
 
+def test_base_says_that_a_motor_does_not_turn(device: MegaDevice, capsys: pytest.CaptureFixture[str]) -> None:
+    device.flags |= STALLED
+    assert main(["base", "--port", str(device.line.path), "--seconds", "0.4"]) == 0
+    assert "a motor does not turn" in capsys.readouterr().out
+
+
 def test_on_a_terminal_base_goes_on_live(device: MegaDevice) -> None:
     master, slave = pty.openpty()
     words = [sys.executable, "-m", "contourslam", "base", "--port", str(device.line.path), "--seconds", "0.8"]
@@ -79,6 +86,24 @@ def test_spin_turns_each_wheel_by_itself(device: MegaDevice, capsys: pytest.Capt
         assert wheel["fault"] is None and wheel["speed"] == pytest.approx(0.1, abs=0.01)
         assert abs(wheel["other"]) < 0.005
     assert abs(device.speed).max() < 100.0
+
+
+def test_a_base_that_may_only_turn_slowly_is_spun_no_faster() -> None:
+    class Listening:
+        config, state = BaseConfig(max_turn_rate=0.2), None
+
+        def __init__(self) -> None:
+            self.driven: list[tuple[float, float]] = []
+
+        def drive(self, v: float, omega: float) -> None:
+            self.driven.append((v, omega))
+
+        def stop(self) -> None:
+            self.driven.append((0.0, 0.0))
+
+    base: Any = Listening()
+    assert list(self_test.spin(base, lambda: bool(base.driven))) == []
+    assert base.driven[0] == pytest.approx((0.026, -0.2))
 
 
 @pytest.mark.usefixtures("short_spin")

@@ -101,7 +101,7 @@ static void happen(void) {
 	double now = avr->cycle / (MHZ * 1e6);
 	if (unplug_at >= 0 && now >= unplug_at) inertial_plug(&inertial, false), unplug_at = -1;
 	if (plug_at >= 0 && now >= plug_at) inertial_plug(&inertial, true), plug_at = -1;
-	if (stick_at >= 0 && now >= stick_at) inertial.stuck = true, stick_at = -1;
+	if (stick_at >= 0 && now >= stick_at) inertial.stuck = true, inertial.stubborn = free_at >= 0, stick_at = -1;
 	if (free_at >= 0 && now >= free_at) inertial.stuck = false, free_at = -1;
 	if (poke_at >= 0 && now >= poke_at && !avr->interrupts.running_ptr)
 		memcpy(avr->data + poke_address, &poke_value, 4), poke_at = -1;

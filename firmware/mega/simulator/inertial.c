@@ -4,10 +4,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "avr_ioport.h"
 #include "avr_twi.h"
+#include "fail.h"
 
 enum {
-	TWSR = 0xB9, TWCR = 0xBC, TWIE = 1, /* the chip's */
+	PORTD = 0x2B, SCL = 1, TWSR = 0xB9, TWCR = 0xBC, TWIE = 1, /* the chip's */
 	MOTION = 0x68, COMPASS = 0x0C,
 	GYRO_CONFIG = 0x1B, ACCEL_CONFIG = 0x1C, INT_PIN_CFG = 0x37, ACCEL_XOUT_H = 0x3B, GYRO_XOUT_H = 0x43,
 	PWR_MGMT_1 = 0x6B, WHO_AM_I = 0x75,
@@ -106,7 +108,7 @@ static void on_bus(struct avr_irq_t *irq, uint32_t value, void *param) {
 	part->only_addressed = (what & TWI_COND_START) && !(message.u.twi.addr & 1);
 	if (what & TWI_COND_STOP) part->addressed = 0;
 	if (what & TWI_COND_START) {
-		part->addressed = 0;
+		part->addressed = part->clocks = 0;
 		if (!answers(part, message.u.twi.addr >> 1)) return;
 		part->addressed = message.u.twi.addr;
 		part->pointed = false;
@@ -138,6 +140,16 @@ static void on_status(struct avr_irq_t *irq, uint32_t status, void *param) {
 	if (part->only_addressed && (status == 0x28 || status == 0x30)) part->avr->data[TWSR] = status - 0x10;
 }
 
+/* The chip makes pins of port D outputs, or no longer: so it clocks a part out that holds the bus. */
+static void on_direction(struct avr_irq_t *irq, uint32_t outputs, void *param) {
+	(void)irq;
+	inertial_t *part = param;
+	bool low = outputs & SCL;
+	if (low && (part->avr->data[PORTD] & SCL)) fail("SCL is driven high, against a part that may hold it low");
+	if (low && !part->clock_low && ++part->clocks >= 9 && !part->stubborn) part->stuck = false;
+	part->clock_low = low;
+}
+
 void inertial_plug(inertial_t *part, bool plugged) {
 	if (plugged && !part->plugged) {
 		reset_motion(part);
@@ -153,4 +165,6 @@ void inertial_begin(inertial_t *part, avr_t *avr) {
 	part->to_bus = avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_INPUT);
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_OUTPUT), on_bus, part);
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_STATUS), on_status, part);
+	avr_irq_t *direction = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL);
+	avr_irq_register_notify(direction, on_direction, part);
 }

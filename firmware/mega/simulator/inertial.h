@@ -15,7 +15,10 @@ typedef struct {
 	/* Base frame: gyro (1/4096 rad/s), accelerometer (mm/s^2), compass (0.1 uT). */
 	int16_t values[9];
 
-	bool stuck; /* it holds the bus: no transfer ends */
+	bool stuck;    /* it holds the bus, so that no transfer ends, until it is clocked nine times ... */
+	bool stubborn; /* ... or goes on all the same */
+	bool clock_low;
+	uint8_t clocks; /* falling edges that the chip has made by itself on SCL since the newest start */
 
 	avr_t *avr;
 	avr_irq_t *to_bus;

@@ -119,6 +119,18 @@ def test_a_part_that_forgot_its_settings_for_a_loose_plug_is_set_up_anew(bench: 
     assert not all(state.flags & IMU for state in mega.states()[40:])
 
 
+def test_a_part_that_holds_the_bus_is_clocked_out(bench: Callable[..., Bench]) -> None:
+    mega = bench("--stick-at", "1.0")
+    mega.imu = READINGS[0]
+    mega.run(1.0)
+    states = len(mega.states())
+    mega.imu = READINGS[1]
+    mega.run(0.2)
+    assert np.all(np.abs(nine(mega.state()) - READINGS[1]) <= TOLERANCES)
+    assert all(state.flags & IMU for state in mega.states()[states:])
+    assert mega.decoder.lost == 0
+
+
 def test_a_bus_that_is_held_is_given_up_and_freed(bench: Callable[..., Bench]) -> None:
     mega = bench("--stick-at", "1.0", "--free-at", "1.5")
     mega.run(1.0)

@@ -5,19 +5,23 @@ from collections.abc import Callable
 import pytest
 from mega_bench import Bench, Motor
 
-from contourslam.robot.base.messages import Ack, Drive, Hello, HelloReply, Tune
+from contourslam.robot.base.messages import STALLED, WATCHDOG, Ack, Drive, Hello, HelloReply, Stop, Tune
 
 STEP = 0.0005
 
 
 def drive(
-    mega: Bench, motors: tuple[Motor, Motor], wanted: tuple[int, int], seconds: float
+    mega: Bench,
+    motors: tuple[Motor, Motor],
+    wanted: tuple[int, int],
+    seconds: float,
+    seen: Callable[[int], int] = lambda ticks: ticks,
 ) -> list[tuple[float, float]]:
-    """Hold a wanted speed; the speeds of the wheels, each step."""
+    """Hold a wanted speed; the speeds of the wheels, each step. The left encoder shows what is `seen` of its ticks."""
     speeds = []
     for count in range(round(seconds / STEP)):
         send = mega.frame(Drive(*wanted)) if count % 100 == 0 else b""
-        mega.step(STEP, send, (motors[0].ticks, motors[1].ticks))
+        mega.step(STEP, send, (seen(motors[0].ticks), motors[1].ticks))
         for motor, duty in zip(motors, mega.duty, strict=True):
             motor.step(STEP, duty)
         speeds.append((motors[0].speed, motors[1].speed))
@@ -101,12 +105,52 @@ def test_the_mean_speed_is_exact(bench: Callable[..., Bench]) -> None:
 def test_a_wheel_that_was_held_does_not_race_when_it_is_let_go(bench: Callable[..., Bench]) -> None:
     mega, motors = bench(), (Motor(friction=2000.0), Motor())
     mega.run(0.05)
-    drive(mega, motors, (2600, 2600), 2.0)
+    drive(mega, motors, (2600, 2600), 0.45)
     assert motors[0].speed == 0
     assert mega.duty[0] == 1000
     motors[0].friction = 0.0
     speeds = drive(mega, motors, (2600, 2600), 1.5)
     assert settled_after([left for left, _ in speeds], 2600) < 1.0
+
+
+@pytest.mark.parametrize("rest", [Stop(), Drive(0, 0)], ids=["STOP", "DRIVE"])
+@pytest.mark.parametrize(
+    ("friction", "seen"),
+    [(2000.0, lambda ticks: ticks), (0.0, lambda ticks: 0), (0.0, lambda ticks: ticks // 2 % 2)],
+    ids=["blocked", "encoder_dead", "one_channel_dead"],
+)
+def test_a_motor_that_does_not_turn_at_full_power_has_both_off_until_the_host_asks_for_rest(
+    bench: Callable[..., Bench], friction: float, seen: Callable[[int], int], rest: Stop | Drive
+) -> None:
+    mega, motors = bench(), (Motor(friction=friction), Motor())
+    mega.run(0.05)
+    drive(mega, motors, (2600, -2600), 0.45, seen)
+    assert mega.duty[0] >= 900
+    assert not mega.state().flags & STALLED
+    drive(mega, motors, (2600, -2600), 0.3, seen)
+    for _ in range(2):
+        assert mega.duty == mega.state().duty == (0, 0)
+        assert mega.state().flags & (STALLED | WATCHDOG) == STALLED
+        drive(mega, motors, (-1000, 500), 0.8, seen)
+    mega.run(0.4)  # nor does the watchdog's time end it
+    assert mega.state().flags & (STALLED | WATCHDOG) == STALLED
+    mega.run(0.05, rest)
+    assert not mega.state().flags & STALLED
+    drive(mega, motors, (2600, -2600), 0.2, seen)
+    assert mega.duty[0] > 0 > mega.duty[1]
+
+
+@pytest.mark.parametrize("gains", [None, Tune(100.0, 0.0, 0.0, 0.0)], ids=["as_built", "tuned"])
+def test_a_wheel_that_turns_slowly_at_full_power_is_not_taken_for_stalled(
+    bench: Callable[..., Bench], gains: Tune | None
+) -> None:
+    mega, motors = bench(), (Motor(friction=997.0), Motor())  # 24 ticks/s with all it has
+    mega.run(0.05)
+    if gains:
+        mega.run(0.05, gains)
+    drive(mega, motors, (2600, 2600), 2.0)
+    assert mega.duty[0] == 1000
+    assert not any(state.flags & STALLED for state in mega.states())
 
 
 def test_no_motor_hums_at_rest(bench: Callable[..., Bench]) -> None:

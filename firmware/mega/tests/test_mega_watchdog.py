@@ -6,11 +6,13 @@ from mega_bench import Bench, framed
 from contourslam.robot.base.messages import WATCHDOG, Ack, Drive, Hello, HelloReply, Stop, Tune
 
 ON_THE_LINE = 16 * 10 / 115200  # a DRIVE
+STEADY = Tune(0.0, 0.0, 0.0, 0.125)  # these wheels stand: what is given them shall not grow until they count as stalled
 
 
 def test_the_motors_stop_300_ms_after_the_last_drive_and_not_before(bench: Callable[..., Bench]) -> None:
     mega = bench()
     mega.run(0.1)
+    mega.run(0.05, STEADY)
     for _ in range(5):
         mega.run(0.29, Drive(3000, -3000), step=0.001)  # late, but never too late
         assert min(map(abs, mega.duty)) > 0
@@ -80,6 +82,7 @@ def test_a_loop_that_hangs_has_its_motors_off_and_starts_anew(
 ) -> None:
     mega = bench("--hang-at", "1.0", *boot_loader)
     mega.run(0.1)
+    mega.run(0.05, STEADY)
     while mega.time < 1.0:
         mega.run(0.05, Drive(3000, 3000))
     assert mega.duty != (0, 0)

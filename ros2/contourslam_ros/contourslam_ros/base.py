@@ -16,7 +16,7 @@ from contourslam.errors import ConfigError
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.recordings.ros_messages import stamp_of
 from contourslam.robot.base.mega import MegaBase
-from contourslam.robot.base.messages import IMPOSSIBLE_STEP
+from contourslam.robot.base.messages import IMPOSSIBLE_STEP, STALLED
 from contourslam.robot.base.states import BaseState
 from contourslam.robot.device_errors import DeviceError
 from contourslam_ros.device_messages import (
@@ -153,6 +153,7 @@ class Base(DeviceNode):
             "resets": str(base.resets),
             "opened anew": str(base.reconnections),
             "stopped by its watchdog": str(base.watchdog_stops),
+            "stopped by a motor that does not turn": str(base.stalls),
             "gyroscope's bias (rad/s)": f"{bias:.5f}",
             "battery (V)": "not wired" if state.battery is None else f"{state.battery:.2f}",
         }
@@ -162,13 +163,14 @@ class Base(DeviceNode):
         return (Diagnostic(Level.OK, "base", speed, values),)
 
     def _warnings(self, state: BaseState, silent: float) -> list[str]:
-        impossible, slipped = bool(self._flags & IMPOSSIBLE_STEP), self._slipped
+        impossible, stalled, slipped = bool(self._flags & IMPOSSIBLE_STEP), bool(self._flags & STALLED), self._slipped
         self._flags, self._slipped = 0, False
         found = {
             f"no word from the base for {silent:.1f} s; check its plug, its cable and its power": silent > SILENT,
             "the battery is low: charge it": state.battery_low,
             "the IMU does not answer, so that the wheels alone tell how it turns; check its wires": state.gyro is None,
             "an encoder steps impossibly; check its wires and their distance from the motors": impossible,
+            "a motor does not turn, or its encoder does not count, and the base has stopped": stalled,
             "wheels and gyroscope do not agree: a wheel slips, or the gyroscope's axes are wrong in config.h": slipped,
         }
         return [trouble for trouble, is_so in found.items() if is_so]

@@ -109,6 +109,7 @@ def _found(base: "MegaBase", state: "BaseState | None", rate: float) -> dict[str
         "resets": base.resets,
         "reconnections": base.reconnections,
         "watchdog_stops": base.watchdog_stops,
+        "stalls": base.stalls,
         "gyro_bias": bias,
         "gyro_bias_sigma": sigma,
         "battery_low": state is not None and state.battery_low,
@@ -127,6 +128,7 @@ def _found(base: "MegaBase", state: "BaseState | None", rate: float) -> dict[str
             "battery": state.battery,
             "duty": list(state.duty),
             "watchdog": state.watchdog,
+            "stalled": state.stalled,
             "command_refused": state.refused,
             "impossible_step": state.impossible_step,
             "slipping": odometry.slipping,
@@ -152,6 +154,7 @@ def _lines(found: dict[str, Any]) -> list[str]:
             for name, text in (
                 ("battery_low", "battery low"),
                 ("watchdog", "stopped by the watchdog"),
+                ("stalled", "stopped, for a motor does not turn or its encoder does not count"),
                 ("command_refused", "a command was refused"),
                 ("impossible_step", "an encoder saw an impossible step"),
                 ("slipping", "wheels and gyroscope disagree"),
@@ -170,10 +173,11 @@ def _lines(found: dict[str, Any]) -> list[str]:
             f"battery:   {battery}",
             f"state:     {', '.join(flags) or 'good'}",
         ]
-    if found["resets"] or found["reconnections"] or found["watchdog_stops"]:
+    if found["resets"] or found["reconnections"] or found["watchdog_stops"] or found["stalls"]:
         lines.append(
             f"trouble:   the board began anew {found['resets']} times, the port was opened anew "
-            f"{found['reconnections']} times, the watchdog stopped the motors {found['watchdog_stops']} times"
+            f"{found['reconnections']} times, the watchdog stopped the motors {found['watchdog_stops']} times, a motor "
+            f"that does not turn {found['stalls']} times"
         )
     return lines
 

@@ -13,7 +13,7 @@ from mega_device import MegaDevice
 
 from contourslam.robot.base import link, mega
 from contourslam.robot.base.mega import MegaBase
-from contourslam.robot.base.messages import BATTERY_LOW, Stop
+from contourslam.robot.base.messages import BATTERY_LOW, STALLED, Stop
 from contourslam.robot.config import BaseConfig
 from contourslam.robot.device_errors import (
     DeviceBaudError,
@@ -193,6 +193,17 @@ def test_a_low_battery_is_told(mega: MegaDevice, base_of: Callable[..., MegaBase
     mega.flags |= BATTERY_LOW
     with base_of() as base:
         assert next(base.states()).battery_low
+
+
+def test_a_motor_that_does_not_turn_is_told_and_counted_once(
+    mega: MegaDevice, base_of: Callable[..., MegaBase]
+) -> None:
+    with base_of() as base:
+        assert until(lambda: base.state is not None and not base.state.stalled)
+        mega.flags |= STALLED
+        assert until(lambda: base.state is not None and base.state.stalled)
+        time.sleep(0.1)
+        assert base.stalls == 1
 
 
 def test_states_end_when_they_are_no_longer_wanted_or_the_base_is_closed(

@@ -56,6 +56,9 @@ class MegaBase:
         How often the port was opened anew.
     watchdog_stops : int
         How often the base stopped by itself, as no command came through.
+    stalls : int
+        How often it did, as a motor at full power turned nothing, or its encoder is dead. :meth:`stop`, or driving with
+        zeros, lets it drive again.
     dropped : int
         States that nobody took in time.
 
@@ -80,7 +83,7 @@ class MegaBase:
         self._link = MegaLink(port or self.config.port)
         self._reader = StateReader(self.config)
         self._commander = Commander(self._link, self.config)
-        self.reconnections = self.watchdog_stops = self.dropped = 0
+        self.reconnections = self.watchdog_stops = self.stalls = self.dropped = 0
         self._changed = threading.Condition()
         self._states: deque[BaseState] = deque(maxlen=_KEPT)
         self._count = 0
@@ -268,6 +271,7 @@ class MegaBase:
         with self._changed:
             before = self._states[-1] if self._states else None
             self.watchdog_stops += state.watchdog and before is not None and not before.watchdog
+            self.stalls += state.stalled and before is not None and not before.stalled
             self._states.append(state)
             self._count += 1
             self._changed.notify_all()

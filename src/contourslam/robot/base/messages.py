@@ -9,9 +9,9 @@ MOST_TICKS = 20000
 """The base refuses speeds beyond this, ticks/s."""
 MOST_GAIN = 100.0
 """And gains beyond this."""
-WATCHDOG, IMU, COMPASS, BATTERY_LOW, REFUSED, IMPOSSIBLE_STEP = 1, 2, 4, 8, 16, 32
+WATCHDOG, IMU, COMPASS, BATTERY_LOW, REFUSED, IMPOSSIBLE_STEP, STALLED = 1, 2, 4, 8, 16, 32, 64
 """Flags of a STATE: the watchdog stopped the motors; the IMU answers; the compass answers; the battery is low; since
-the last STATE a frame was refused; an encoder saw an impossible step."""
+the last STATE a frame was refused; an encoder saw an impossible step; the motors are off as one did not turn."""
 RESULTS = {0: "obeyed", 1: "unknown type", 2: "wrong length", 3: "value out of range"}
 """What an ACK says."""
 

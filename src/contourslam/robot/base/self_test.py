@@ -54,9 +54,10 @@ def spin(base: MegaBase, stopped: Callable[[], bool] = lambda: False) -> Iterato
     DeviceError
         If the base is gone.
     """
-    wanted = min(SPEED, base.config.max_speed, base.config.max_wheel_speed)
+    config = base.config
+    wanted = min(SPEED, config.max_speed, config.max_wheel_speed, config.max_turn_rate * config.wheel_base)
     for side, name in enumerate(("left", "right")):
-        turning = (-1.0 if name == "left" else 1.0) * wanted / base.config.wheel_base
+        turning = (-1.0 if name == "left" else 1.0) * wanted / config.wheel_base
         _hold(base, 0.5 * wanted, turning, _REACH, stopped)
         before = base.state
         _hold(base, 0.5 * wanted, turning, _MEASURE, stopped)
@@ -84,7 +85,7 @@ def _judged(base: MegaBase, side: int, name: str, wanted: float, before: BaseSta
     fault = None
     if abs(speed) < 0.1 * wanted and abs(other) > 0.3 * wanted:
         fault = "the other wheel's encoder counts instead: swap the two encoders' plugs, or the two motors'"
-    elif abs(speed) < 0.1 * wanted and abs(duty) < 0.05:
+    elif abs(speed) < 0.1 * wanted and abs(duty) < 0.05 and not after.stalled:
         fault = "its motor gets nothing: is the firmware's watchdog tripped, is a command refused?"
     elif abs(speed) < 0.1 * wanted:
         fault = "it does not turn, or its encoder does not count: check motor, motor driver and encoder"

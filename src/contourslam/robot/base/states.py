@@ -78,6 +78,11 @@ class BaseState:
         """An encoder saw both channels change at once since the STATE before: noise, or ticks lost."""
         return bool(self.flags & messages.IMPOSSIBLE_STEP)
 
+    @property
+    def stalled(self) -> bool:
+        """A motor at full power turned nothing, or its encoder is dead: both are off until a stop or zero speeds."""
+        return bool(self.flags & messages.STALLED)
+
     def wheels(self) -> WheelReading:
         """Give the wheels as recordings keep them."""
         return WheelReading(self.stamp, self.wheel_angles, self.wheel_speeds)
@@ -138,7 +143,7 @@ class StateReader:
         Returns
         -------
         BaseState or None
-            None where it is the same as the one before, or older.
+            None where its time is that of the one before; an older one is taken for a board that began anew.
         """
         latest = read - behind * _BYTE
         last, self._last = self._last, state
