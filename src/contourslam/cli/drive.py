@@ -200,4 +200,6 @@ class _Status:
             parts.append(f"{state.battery:.1f} V{' LOW' if state.battery_low else ''}")
         if state is not None and state.watchdog:
             parts.append("stopped by its watchdog")
+        if state is not None and state.stalled:
+            parts.append("stopped: a motor does not turn, or its encoder does not count")
         return "  ".join([*parts, *(f"no {name}" for name in self._robot.troubles)])
