@@ -1,5 +1,6 @@
 """The command that drives the robot, against an X4 and a Mega on pseudo-terminals."""
 
+import errno
 import json
 import signal
 import subprocess
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag2 import Writer
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "robot" / "base"))  # the simulated Mega
 
@@ -65,7 +67,10 @@ def test_a_drive_along_a_route_leaves_a_run_and_its_recording(
     assert isinstance(mega.commands[-1][1], Stop)
 
 
-def test_ctrl_c_stops_the_motors_and_keeps_what_was_done(robot: Path, mega: MegaDevice, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "kill"])
+def test_ctrl_c_and_kill_stop_the_motors_and_keep_what_was_done(
+    number: signal.Signals, robot: Path, mega: MegaDevice, tmp_path: Path
+) -> None:
     out, route = tmp_path / "out", tmp_path / "way.csv"
     route.write_text("0, 0\n5, 0\n")
     words = [sys.executable, "-m", "contourslam", "drive", "-o", str(out), "--robot", str(robot), "--route", str(route)]
@@ -73,12 +78,30 @@ def test_ctrl_c_stops_the_motors_and_keeps_what_was_done(robot: Path, mega: Mega
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not any(drive.left > 0 for drive in mega.drives()):
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     said, complaints = process.communicate(timeout=60)
     assert process.returncode == 0, complaints
     assert "scans" in said and "stopping" in complaints
     assert isinstance(mega.commands[-1][1], Stop)
     assert read_result_folder(out).result.stamps.size > 0
+    assert any(isinstance(m, LaserScan) for m in open_recording(out / "recording").messages())
+
+
+@pytest.mark.usefixtures("mega")
+def test_a_recording_that_cannot_be_completed_costs_nothing_of_the_run(
+    robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Writer) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Writer, "close", full)
+    out = tmp_path / "out"
+    assert main(["drive", "-o", str(out), "--robot", str(robot), "--seconds", "3"]) == 1
+    said = capsys.readouterr()
+    assert "cannot be written: No space left on device" in said.err
+    assert "scans" in said.out and "the recording is in" not in said.out
+    run = read_result_folder(out).result
+    assert run.stamps.size > 0 and any("No space left" in reason for reason in run.skipped)
 
 
 def test_what_cannot_go_together_is_told_before_anything_moves(tmp_path: Path, failure: Failure) -> None:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contourslam.cli.console import make_way, note, prepare_folder, print_json
+from contourslam.cli.console import complain, make_way, note, prepare_folder, print_json
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Patience, Settings
 from contourslam.cli.run import DEFAULTS
 from contourslam.config import Config
-from contourslam.errors import ConfigError
+from contourslam.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
     from contourslam.robot.bring_up import Event, Robot
@@ -63,7 +63,7 @@ class Drive:
         """Drive, map, record, and say how it went."""
         from contourslam.live.warming import warm_up
         from contourslam.recordings import RecordingWriter
-        from contourslam.robot.bring_up import Robot, openers
+        from contourslam.robot.bring_up import Robot, Trouble, openers
         from contourslam.robot.config import RobotConfig, load_robot
         from contourslam.robot.journey import Journey
         from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
@@ -96,6 +96,10 @@ class Drive:
             robot.close()
             status.clear()
             live_map.close()
+            try:
+                writer.close()
+            except RecordingError as error:  # what was mapped is written all the same
+                journey.troubles.append(Trouble(time.time(), "recording", str(error)))
         if not journey.scans:
             note("no turn of the lidar was completed; there is no map")
             return INTERRUPTED if interrupt.requested else 1
@@ -156,15 +160,19 @@ class Drive:
         write_result_folder(self.output, result, settings, metrics, command=command)
         write_run_page(self.output, result, settings, metrics, command=command, name=self.output.resolve().name)
         live_map.session.save(self.output / "map.cmap")
+        unrecorded = [trouble.message for trouble in journey.troubles if trouble.part == "recording"]
         if self.json:
             print_json(metrics)
         else:
             size = metrics["landmarks"]
+            recorded = "" if unrecorded else f"; the recording is in {self.output / 'recording'}"
             print(
                 f"{self.output}: {journey.scans} scans, {journey.pictures} pictures, {size['corners']} corners, "
-                f"{size['walls']} walls, {metrics['loops']} loops; the recording is in {self.output / 'recording'}"
+                f"{size['walls']} walls, {metrics['loops']} loops{recorded}"
             )
-        return 0
+        for message in unrecorded:
+            complain(message)
+        return 1 if unrecorded else 0
 
 
 class _Status:

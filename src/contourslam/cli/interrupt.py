@@ -1,4 +1,4 @@
-"""Ctrl-C ends the work between two items, not in the middle of one: what is done until then is whole and kept."""
+"""Ctrl-C or `kill` ends the work between two items, not in the middle of one: what is done is whole and kept."""
 
 import os
 import signal
@@ -13,22 +13,28 @@ T = TypeVar("T")
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as shells have it."""
+_ASKING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Interrupt:
-    """Inside this context the first Ctrl-C only asks to stop, the second one stops at once."""
+    """Inside this context Ctrl-C, `kill` or a closing terminal only ask to stop; Ctrl-C after that stops at once."""
 
     def __init__(self) -> None:
         self.requested = False
 
     def __enter__(self) -> Self:
-        self._previous = signal.signal(signal.SIGINT, self._ask)
+        self._previous = {
+            number: signal.signal(number, self._ask)
+            for number in _ASKING
+            if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN  # as nohup wants it
+        }
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        signal.signal(signal.SIGINT, self._previous)
+        for number, previous in self._previous.items():
+            signal.signal(number, previous)
 
     def or_after(self, seconds: float | None) -> Callable[[], bool]:
         """Give what says whether to stop: after Ctrl-C, or once so many seconds from now are over; None for never."""
@@ -37,10 +43,18 @@ class Interrupt:
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         if self.requested:
-            raise KeyboardInterrupt
+            if number == signal.SIGINT:  # a shell or a supervisor may send the others twice, and means it once
+                raise KeyboardInterrupt
+            return
         self.requested = True
-        # Not print: a handler may run in the middle of another print.
-        os.write(2, b"\ncontourslam: stopping, keeping what is done; Ctrl-C again stops at once\n")
+        try:
+            # Not print: a handler may run in the middle of another print.
+            os.write(2, b"\ncontourslam: stopping, keeping what is done; Ctrl-C again stops at once\n")
+            closed = number not in (signal.SIGINT, signal.SIGTERM) and os.isatty(2)
+        except OSError:
+            closed = True
+        if closed:  # a word to a terminal that is no more would end the work in its middle
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 
 
 class UntilStopped(Generic[T]):

@@ -7,6 +7,7 @@ import termios
 import time
 import tty
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self, TextIO
 
@@ -112,7 +113,8 @@ class Keyboard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._before is not None:
-            termios.tcsetattr(self._number, termios.TCSADRAIN, self._before)
+            with suppress(termios.error):  # the terminal has closed
+                termios.tcsetattr(self._number, termios.TCSADRAIN, self._before)
 
     def pressed(self) -> bytes:
         """Give what was pressed since the last call; returns at once."""
