@@ -59,6 +59,14 @@ def test_an_open_way_ends_at_its_end() -> None:
     assert poses[-1, 3:].tolist() == [0.0, 0.0]
 
 
+def test_an_open_way_that_comes_back_to_its_start_has_not_ended_there() -> None:
+    pilot = Pilot(sample_route((*SQUARE, SQUARE[0]), closed=False), closed=False, config=PilotConfig())
+    pilot.steer((0.0, 0.006, 0.0), 0.02)
+    assert not pilot.arrived
+    poses = drive(pilot, (0.0, 0.006, 0.0), 60.0)
+    assert pilot.arrived and np.ptp(poses[:, :2], axis=0).min() > 1.8
+
+
 def test_a_robot_that_looks_the_wrong_way_turns_first() -> None:
     pilot = Pilot(sample_route(SQUARE, closed=False), closed=False, config=PilotConfig())
     v, omega = pilot.steer((0.0, 0.0, math.pi), 0.1)

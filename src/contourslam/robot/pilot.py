@@ -100,9 +100,10 @@ class Pilot:
 
     def _wanted(self, pose: Pose) -> tuple[float, float]:
         config, count = self._config, len(self._way)
-        if self._index is None:  # wherever the robot stands, it begins at the way's nearest point
-            self._index = int(np.argmin(np.hypot(self._way[:, 0] - pose[0], self._way[:, 1] - pose[1])))
         span = round(_WINDOW / self._spacing)
+        if self._index is None:  # it begins at the way's nearest point; an open one's end may be near its beginning
+            first = self._way if self._closed else self._way[:span]
+            self._index = int(np.argmin(np.hypot(first[:, 0] - pose[0], first[:, 1] - pose[1])))
         ahead = self._index + np.arange(span)
         ahead = ahead % count if self._closed else ahead[ahead < count]
         near = int(np.argmin(np.hypot(self._way[ahead, 0] - pose[0], self._way[ahead, 1] - pose[1])))
