@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.config import Config
+from contourslam.errors import ContourslamError
 from contourslam.experiments.loop_values import (
     KEPT,
     Counters,
@@ -77,7 +78,7 @@ def robot_in_the_loop(
     Raises
     ------
     ContourslamError
-        If the firmware is not built, an extra is missing, or a part does not come up.
+        If the firmware is not built, an extra is missing, a part does not come up, or it is ended before it drives.
     """
     room = ROOMS[config.room]
     settings = settings_of(robot_config(config, Path(), Path()), config.settings)
@@ -160,6 +161,8 @@ def _drive(
     journey = Journey(robot, live_map, writer, watch=watch)
     for event in robot.wait_until_ready(stopped):
         journey.take(event)
+    if stopped():
+        raise ContourslamError("the robot in the loop was ended before it drove")
     fault = _FaultAtItsTime(config, world)
     begun, busy = time.monotonic(), time.process_time()
 

@@ -1,5 +1,8 @@
 """The live world at real time in its process, with a board that has no firmware."""
 
+import multiprocessing
+import os
+import signal
 import threading
 import time
 from functools import partial
@@ -61,6 +64,28 @@ def test_lines_are_damaged_when_asked_and_bytes_of_the_base_go_both_ways(tmp_pat
 def test_a_world_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     with pytest.raises(ContourslamError, match="the simulated robot failed: ContourslamError: the board is not there"):
         RunningWorld(CONFIG, partial(FakeBoard, (0, 0), fails=True), tmp_path)
+
+
+def process() -> multiprocessing.process.BaseProcess:
+    return next(one for one in multiprocessing.active_children() if one.name == "world")
+
+
+def test_ctrl_c_leaves_the_world_to_the_process_that_made_it(tmp_path: Path) -> None:
+    with RunningWorld(CONFIG, partial(FakeBoard, (0, 0)), tmp_path) as world:
+        os.kill(process().pid or 0, signal.SIGINT)
+        time.sleep(0.2)
+        assert world.finish().steps > 0
+
+
+def test_a_world_that_has_ended_is_told_with_its_reason_whatever_it_is_asked(tmp_path: Path) -> None:
+    with RunningWorld(CONFIG, partial(FakeBoard, (0, 0)), tmp_path) as world:
+        killed = process()
+        killed.kill()
+        killed.join()
+        with pytest.raises(ContourslamError, match="its process ended with code -9"):
+            world.unplug_lidar(1.0)
+        with pytest.raises(ContourslamError, match="its process ended with code -9"):
+            world.finish()
 
 
 def test_the_same_seed_makes_the_same_robot(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import contextlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from multiprocessing.connection import Connection
@@ -73,16 +74,17 @@ class RunningWorld:
 
     def unplug_lidar(self, seconds: float) -> None:
         """Pull the lidar's cable, and plug it in again so much later."""
-        self._mine.send(("unplug", seconds))
+        self._order("unplug", seconds)
 
     def damage(self, damage: Damage) -> None:
         """Damage bytes on both lines, both ways, from now on."""
-        self._mine.send(("damage", damage))
+        self._order("damage", damage)
 
     def finish(self) -> Record:
         """End it and tell what really happened."""
         if self._record is None:
-            self._mine.send(("finish", None))
+            with contextlib.suppress(OSError):  # it has ended; its answer says why
+                self._mine.send(("finish", None))
             self._record = self._answer(_DONE)
         return self._record
 
@@ -93,6 +95,12 @@ class RunningWorld:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
+
+    def _order(self, order: str, value: Any) -> None:
+        try:
+            self._mine.send((order, value))
+        except OSError:  # it has ended; its answer says why
+            self._answer(_DONE)
 
     def _answer(self, seconds: float) -> Any:
         try:
@@ -118,6 +126,7 @@ def _live(
     period: float,
 ) -> None:
     """What the process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the one that made this one ends it
     with contextlib.suppress(OSError):  # without the rights to it, it runs like any other
         os.nice(_BEFORE_OTHERS)  # physics waits for nobody
     try:

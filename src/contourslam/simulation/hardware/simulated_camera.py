@@ -3,6 +3,7 @@
 import contextlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 
@@ -86,6 +87,7 @@ class SimulatedCamera(PictureSource):
 
 def _draw(room: Room, camera: CameraModel, seed: int, poses: Connection, pictures: Connection) -> None:
     """What the process does: the newest pose is drawn, those before it are left out."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the one that made this one ends it
     os.nice(10)  # the world and the robot's own computer have no time to lose
     with contextlib.suppress(EOFError, OSError):
         try:
