@@ -9,6 +9,7 @@ import pytest
 
 from contourslam.config import Config, LiveConfig, MotionConfig, SlamConfig
 from contourslam.errors import RecordingError
+from contourslam.geometry.poses import compose
 from contourslam.recordings import RecordingWriter, open_recording
 from contourslam.recordings.picture import Picture
 from contourslam.replay import replay
@@ -123,6 +124,42 @@ def test_where_the_robot_is_now_goes_on_from_the_bases_last_word(run: SimulatedR
     assert sight.pose is not None and sight.sigma < 0.05
     gone = np.hypot(*(np.array(sight.pose) - run.initial_pose)[:2])
     assert gone == pytest.approx(0.5 * (time.time() - now + 0.2), abs=0.05)
+
+
+def test_a_mapping_that_stands_still_leaves_the_robot_blind(run: SimulatedRun) -> None:
+    ahead = [0.0]
+    made = LiveMap(SETTINGS, LiveConfig(), lidar_mount=ROBOT.lidar.mount, clock=lambda: time.monotonic() + ahead[0])
+    journey = Journey(Robot(Openers()), made)
+    for message in run.messages():
+        if isinstance(message, LaserScan | Odometry) and journey.scans < 3:
+            journey.take(message if isinstance(message, LaserScan) else state(message))
+    settled(made, 2)
+    assert journey.sight().blind < 4.0
+    ahead[0] = 5.0
+    assert journey.sight().blind > 4.0
+    made.close()
+
+
+def test_odometry_that_leaps_hides_the_pose_until_the_map_has_taken_it_in(run: SimulatedRun) -> None:
+    made, leap = live_map(run), np.array([3.0, -2.0, 0.0])
+    messages = [m for m in run.messages() if isinstance(m, LaserScan | Odometry)]
+    half = len(messages) // 2
+    for message in messages[:half]:
+        made.push(message)
+    settled(made, 5)
+    assert made.pose() is not None
+    later = [Odometry(m.stamp, compose(leap, m.pose)) if isinstance(m, Odometry) else m for m in messages[half:]]
+    begun = next(at for at, message in enumerate(later, 1) if isinstance(message, Odometry))
+    for message in later[:begun]:
+        made.push(message)
+    assert made.pose() is None
+    for message in later[begun:]:
+        made.push(message)
+    until = time.monotonic() + 30.0
+    while made.pose() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    assert made.pose() is not None
+    made.close()
 
 
 def test_a_recording_that_fails_is_told_once_and_ends_nothing_else(run: SimulatedRun) -> None:

@@ -40,7 +40,7 @@ class Sight:
     sigma : float
         Standard deviation of its position at the last scan, m.
     blind : float
-        Time since the last scan, s.
+        Time since the last scan came, or since one was mapped, whichever is longer, s.
     """
 
     pose: tuple[float, float, float] | None
@@ -116,7 +116,8 @@ class Journey:
         last = self._map.last
         sigma = 0.0 if last is None else math.sqrt(max(float(last.covariance[0, 0] + last.covariance[1, 1]), 0.0))
         localized = last is not None and last.localized
-        return Sight(self._pose_now() if localized else None, sigma, time.monotonic() - self._scanned)
+        blind = max(time.monotonic() - self._scanned, self._map.since_mapped)
+        return Sight(self._pose_now() if localized else None, sigma, blind)
 
     def _pose_now(self) -> tuple[float, float, float] | None:
         pose, state = self._map.pose(), self._state

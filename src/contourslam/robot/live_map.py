@@ -1,5 +1,6 @@
 """The map made while the robot drives: a live session in its thread, and what it leaves behind as a run."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -24,6 +25,9 @@ Floats = NDArray[np.float64]
 _TURN_PER_M_DEG, _TURN_PER_RAD_DEG = 0.3, 0.6  # of a gyroscope whose bias was found at rest, and its scale
 _LEAST_LATERAL = 0.003  # m after one metre
 _CLOCK = 0.003  # s by which the stamps of lidar and base may differ
+_FASTEST = np.array([2.0, 6.0])  # m/s, rad/s; no faster is the robot
+_SLACK = np.array([0.1, 0.2])  # m, rad
+_UNSEEN = 0.5  # s; a base that is silent for longer has stopped its motors
 
 PATIENT = LiveConfig(wait=1.5, silent_after=3.0, max_waiting=20)
 """Over a line that damages nine of ten frames the odometry comes a few times a second: scans wait for it, for a scan
@@ -88,6 +92,7 @@ class LiveMap:
         )
         self._start = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, dtype=np.float64)
         self._error: BaseException | None = None
+        self._clock, self._mapped_at, self._leapt_at = clock, math.inf, -math.inf
         self._worker = Worker(self.session, self._take, clock=clock, failed=self._fail)
         self._lock = threading.Lock()
         self._done: list[tuple[Processed, int]] = []
@@ -105,17 +110,30 @@ class LiveMap:
         if self._error is not None:
             raise self._error
         if isinstance(message, Odometry):
+            if self._readings and _leaps(self._readings[-1], message):
+                with self._lock:
+                    self._leapt_at = message.stamp
             self._readings.append(message)
             self._worker.push_odometry(message)
         else:
             self._worker.push_scan(message)
 
     def _take(self, processed: Processed) -> None:
+        self._mapped_at = self._clock()
         with self._lock:
             self._done.append((processed, len(self._readings)))
+            if processed.stamp >= self._leapt_at:
+                handed_on = compose(processed.T_map_odom_smooth, processed.T_odom_base)
+                if (_apart(processed.T_map_base, handed_on) < _SLACK).all():
+                    self._leapt_at = -math.inf
 
     def _fail(self, error: BaseException) -> None:
         self._error = error
+
+    @property
+    def since_mapped(self) -> float:
+        """Time since a scan was mapped last, s; 0 before the first."""
+        return max(self._clock() - self._mapped_at, 0.0)
 
     @property
     def last(self) -> Processed | None:
@@ -124,8 +142,12 @@ class LiveMap:
             return self._done[-1][0] if self._done else None
 
     def pose(self) -> tuple[float, float, float] | None:
-        """Pose of the base at the newest odometry reading: x (m), y (m), heading (rad); None before the first scan."""
-        if not self._readings:
+        """Pose of the base at the newest odometry reading: x (m), y (m), heading (rad).
+
+        None before the first scan, and from a leap of the odometry, as where the base's driver was started again, until
+        the map has taken it in.
+        """
+        if not self._readings or self._leapt_at > -math.inf:
             return None
         newest = self._readings[-1]
         T_map_odom = self.session.map_to_odom(newest.stamp)
@@ -193,3 +215,15 @@ class LiveMap:
             loops=finished.loops if finished is not None else (),
             readings=readings,
         )
+
+
+def _apart(a: Floats, b: Floats) -> Floats:
+    """How far apart two poses are: m, rad."""
+    x, y, turn = between(a, b).tolist()
+    return np.array([math.hypot(x, y), abs(turn)])
+
+
+def _leaps(before: Odometry, after: Odometry) -> bool:
+    """Whether the odometry says what no robot can do."""
+    elapsed = min(max(after.stamp - before.stamp, 0.0), _UNSEEN)
+    return bool((_apart(before.pose, after.pose) > _FASTEST * elapsed + _SLACK).any())

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,12 +10,13 @@ import pytest
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError
 from contourslam.geometry.poses import compose
+from contourslam.recordings import WheelReading, open_recording, write_recording
 from contourslam.replay import replay
 from contourslam.robot.base.calibration import BaseCalibration, calibrate
 from contourslam.robot.base.odometry import arc
-from contourslam.robot.base.wheel_track import WheelTrack, track_from_odometry
+from contourslam.robot.base.wheel_track import WheelTrack, read_track, track_from_odometry
 from contourslam.robot.config import BaseConfig
-from contourslam.scan import TruePose
+from contourslam.scan import LaserScan, TruePose
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.odometry import effective_wheels, read_odometry
 from contourslam.simulation.rooms import ROOMS
@@ -127,6 +129,16 @@ def test_odometry_that_jumped_is_no_turn_of_the_wheels() -> None:
     poses = np.array([[0.1 * k, 0.0, 0.0] for k in range(5)] + [[0.1 * k - 0.4, 5.0, 2.0] for k in range(5)])
     angles = track_from_odometry(np.arange(10.0), poses, BELIEVED).angles
     assert np.abs(np.diff(angles, axis=0)).max() < 2.5
+
+
+def test_wheels_that_were_counted_anew_did_not_turn_back(tmp_path: Path) -> None:
+    angles = 20.0 + np.arange(10.0)
+    angles[6:] -= 26.0  # the driver was started again
+    readings = [WheelReading(100.0 + 0.1 * k, (angle, angle), (0.0, 0.0)) for k, angle in enumerate(angles.tolist())]
+    scan = LaserScan(102.0, np.linspace(-3.0, 3.0, 30), np.full(30, 2.0), np.zeros(30), 0.1, 10.0)
+    write_recording(tmp_path / "run", [*readings, scan])
+    track = read_track(open_recording(tmp_path / "run"), BELIEVED)
+    np.testing.assert_allclose(track.angles[:, 0], [20, 21, 22, 23, 24, 25, 25, 26, 27, 28])
 
 
 def test_from_slams_own_trajectory_in_simulation_a_two_percent_error_is_found() -> None:

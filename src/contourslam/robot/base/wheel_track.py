@@ -1,6 +1,6 @@
 """How far the wheels turned during a drive: from their own readings, or from odometry that was made of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from contourslam.scan import Odometry
 
 Floats = NDArray[np.float64]
 
-_JUMP = 1.0  # rad or m between two readings: the driver was started again
+_JUMP = 1.0  # m, or rad of the base's heading, between two readings: the driver was started again
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,8 @@ def read_track(recording: Recording, base: BaseConfig) -> WheelTrack:
     readings = list(recording.wheel_readings())
     if len(readings) > 1:
         stamps = np.array([reading.stamp for reading in readings])
-        return _rising(stamps, np.array([reading.angles for reading in readings]), "the wheels' angles")
+        track = _rising(stamps, np.array([reading.angles for reading in readings]), "the wheels' angles")
+        return replace(track, angles=_joined(track.angles, base))
     odometry = [message for message in recording.messages() if isinstance(message, Odometry)]
     if len(odometry) < 2:
         raise RecordingError(
@@ -88,6 +89,13 @@ def track_from_odometry(stamps: Floats, poses: Floats, base: BaseConfig) -> Whee
     way = np.where(jumped, 0.0, way)
     angles = np.column_stack([(way - half) / base.left_radius, (way + half) / base.right_radius])
     return _rising(stamps, np.concatenate([np.zeros((1, 2)), np.cumsum(angles, axis=0)]), "the odometry")
+
+
+def _joined(angles: Floats, base: BaseConfig) -> Floats:
+    """Angles without the jumps that a driver makes that was started again: the wheels stood still meanwhile."""
+    steps = np.diff(angles, axis=0)
+    jumped = (np.abs(steps * [base.left_radius, base.right_radius]) > _JUMP).any(axis=1, keepdims=True)
+    return np.concatenate([angles[:1], angles[:1] + np.cumsum(np.where(jumped, 0.0, steps), axis=0)])
 
 
 def _rising(stamps: Floats, angles: Floats, source: str) -> WheelTrack:
