@@ -151,6 +151,21 @@ def test_a_camera_that_is_not_there_stops_nobody() -> None:
         assert robot.troubles == {"camera": "no camera was found"}
 
 
+def test_a_film_in_the_cameras_place_is_shown_once() -> None:
+    parts = Parts()
+
+    class Reel(Part):
+        def frames(self, stopped: Stopped) -> Iterator[Any]:
+            yield from (self.make(0.1 * number) for number in range(2))
+
+    reel = Reel(lambda stamp: Picture(stamp, JPEG, "jpeg"), parts.log, "camera")
+    with Robot(Openers(parts.lidar.open, parts.base.open, reel.open)) as robot:
+        for _ in range(2):
+            until(robot, lambda event: isinstance(event, Picture))
+        time.sleep(1.3)  # longer than until a part that failed is tried again
+    assert reel.opened == 1 and parts.log.count("camera closes") == 1
+
+
 def test_a_part_that_never_says_a_word_is_named() -> None:
     parts, held = Parts(), threading.Event()
 

@@ -253,6 +253,8 @@ class Robot:
             while not self._ending.is_set():
                 try:
                     work()
+                    if name == "camera":  # a film or a folder has come to its end; what is live goes on until the end
+                        return
                 except ContourslamError as error:
                     self._tell(name, str(error))
                 self._ending.wait(_RETRY)

@@ -88,11 +88,19 @@ def first(source: Iterator[Picture], count: int) -> list[Picture]:
 
 
 def test_a_cameras_own_jpeg_is_passed_on_untouched_at_the_drivers_time(device: Path) -> None:
-    with VideoCamera(str(device), capture=lambda _: Capture(device), clock=lambda: 1000.0) as camera:
+    clock = itertools.count(1000.0).__next__
+    with VideoCamera(str(device), capture=lambda _: Capture(device), clock=clock) as camera:
         pictures = first(camera.frames(), 3)
     assert [picture.data for picture in pictures] == [JPEG] * 3
-    assert all(picture.stamp == pytest.approx(1000.0 - 0.02, abs=0.01) for picture in pictures)
+    assert [picture.stamp for picture in pictures] == pytest.approx([999.98, 1000.98, 1001.98], abs=0.01)
     assert camera.exposure == pytest.approx(0.0125)
+
+
+def test_of_a_camera_that_gives_more_than_is_wanted_the_pictures_between_are_left_out(device: Path) -> None:
+    clock = itertools.count(1000.0, 0.04).__next__
+    with VideoCamera(str(device), rate=10.0, capture=lambda _: Capture(device, most=9), clock=clock) as camera:
+        stamps = [picture.stamp for picture in first(camera.frames(), 3)]
+    assert np.diff(stamps) == pytest.approx([0.12, 0.12], abs=0.01)
 
 
 @pytest.mark.parametrize("give", ["colours", "raw"])
@@ -116,7 +124,7 @@ def test_a_camera_that_was_unplugged_is_taken_up_again(device: Path) -> None:
         opened.append(Capture(device, most=3))
         return opened[-1]
 
-    with VideoCamera(str(device), capture=plug) as camera:
+    with VideoCamera(str(device), capture=plug, clock=itertools.count(1000.0).__next__) as camera:
         frames = camera.frames()
         assert len(first(frames, 3)) == 3
         back = threading.Timer(0.3, device.touch)

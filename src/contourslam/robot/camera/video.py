@@ -24,6 +24,7 @@ from contourslam.robot.device_errors import (
 from contourslam.robot.serial_port import join_group
 
 _LATEST = 1.0  # s: a driver's own stamp older than this is of another clock
+_EARLY = 0.9  # of the time between two pictures; many cameras have but one rate, and come too soon for another
 _LONGEST_PAUSE = 2.0  # s between two tries to open a camera that has gone
 
 
@@ -39,7 +40,7 @@ class VideoCamera(PictureSource):
     width, height : int
         Wanted size, pixels; the camera takes the nearest that it has.
     rate : float
-        Wanted pictures a second.
+        Wanted pictures a second; of a camera that gives more, those between are left out.
     timeout : float
         Time without a picture after which something is wrong, s.
     patience : float
@@ -79,12 +80,14 @@ class VideoCamera(PictureSource):
 
     def frames(self, stopped: Callable[[], bool] = never) -> Iterator[Picture]:
         """See :meth:`PictureSource.frames`; a camera that goes away is opened again once it is back."""
-        heard = time.monotonic()
+        heard, last = time.monotonic(), -math.inf
         while not stopped():
             picture = self._read()
             if picture is not None:
                 heard = time.monotonic()
-                yield picture
+                if not 0.0 <= picture.stamp - last < _EARLY / self._rate:  # not where the clock was set back
+                    last = picture.stamp
+                    yield picture
                 continue
             if self._gone():
                 if not self._reconnect(stopped):
