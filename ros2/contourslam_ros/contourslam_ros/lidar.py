@@ -9,7 +9,6 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import LaserScan as ScanMessage
 from std_srvs.srv import Trigger
 
-from contourslam.geometry.rigid import from_planar
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.robot.lidar.even_beams import even_beams
 from contourslam.robot.lidar.figures import LidarTally
@@ -50,7 +49,7 @@ class Lidar(DeviceNode):
         super().start()
         if self._config.place_from_file:
             base, laser = self._config.named(self._config.base_frame), self._config.named(self._config.frame)
-            self.place(place_message(base, laser, from_planar(self._part.mount, self._part.height)))
+            self.place(place_message(base, laser, self._part.place))
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Publish a scan for each turn while they are wanted."""
@@ -80,7 +79,8 @@ class Lidar(DeviceNode):
         """Say how the scans come."""
         if self._resting.is_set():
             return (Diagnostic(Level.OK, "lidar", "at rest until ~/start_motor is called"),)
-        assert self._lidar is not None
+        if self._lidar is None:
+            return (Diagnostic(Level.ERROR, "lidar", self.unanswered),)
         lidar, figures = self._lidar, self._tally.figures()
         values = {
             "port": lidar.name,

@@ -45,7 +45,6 @@ class CalibrateExtrinsics:
         """Calibrate, and say how well it went."""
         from dataclasses import replace
 
-        from contourslam.geometry.rigid import from_planar
         from contourslam.recordings import open_recording
         from contourslam.robot.camera.board import Board
         from contourslam.robot.camera.camera_file import load_lens
@@ -78,8 +77,7 @@ class CalibrateExtrinsics:
         sights = list(find_sights(progress(noted(), "picture"), board, part.model))
         stands = find_stands(sights, stamps, recording.messages(), board, part.model)
         found = find_extrinsics(stands, board, margin=self.margin)
-        T_base_lidar = from_planar(robot.lidar.mount, robot.lidar.height)
-        part = part.placed(T_base_lidar @ found.T_lidar_camera)
+        part = part.placed(robot.lidar.place @ found.T_lidar_camera)
         save_robot(self.robot, replace(robot, camera=part), header=command)
         if self.json:
             print_json(_told(found, part) | {"pictures": len(stamps), "with_board": len(sights)})

@@ -22,7 +22,7 @@ from contourslam.robot.serial_port import LIDAR, find_port, open_port, set_dtr
 from contourslam.scan import LaserScan
 
 BAUD = 128000
-SCAN, STOP, INFO, HEALTH, RESTART = (bytes([0xA5, code]) for code in (0x60, 0x65, 0x90, 0x91, 0x80))
+SCAN, STOP, INFO, HEALTH = (bytes([0xA5, code]) for code in (0x60, 0x65, 0x90, 0x91))
 _REPLY = b"\xa5\x5a"
 _BATCH = 0.015  # s of bytes read at once: fewer wake-ups, and the clock knows that they are late
 _MOST_RESTARTS, _RESTART_SPAN = 3, 60.0  # more than so many in so many seconds is a supply that does not hold
@@ -174,11 +174,6 @@ class YdlidarX4:
         """Switch the scan and the motor off."""
         self._write(STOP)
         self._motor(False)
-        self.turns.reset()
-
-    def restart(self) -> None:
-        """Have the lidar start anew, as after power on."""
-        self._write(RESTART)
         self.turns.reset()
 
     def close(self) -> None:
