@@ -17,8 +17,8 @@ NAMES: dict[Fault, str] = {
     "damaged": "5 % of serial bytes damaged",
 }
 COLUMNS = [
-    "fault", "RMSE x / y / heading, m, m, rad", "worst seed", "target", "revised at the end", "scans", "way, m",
-    "steps late by 20 ms", "robot's computer", "world",
+    "fault", "RMSE x / y / heading, m, m, rad", "worst seed", "target", "raw odometry", "revised at the end", "scans",
+    "way, m", "steps late by 20 ms", "robot's computer", "world",
 ]  # fmt: skip
 
 
@@ -48,11 +48,13 @@ def drive(fault: Fault, seed: int, firmware: Firmware) -> LoopResult:
 def row(fault: Fault, results: list[LoopResult]) -> list[object]:
     online = np.array([list(result.online.values()) for result in results])
     revised = np.array([list(result.revised.values()) for result in results])
+    raw = np.array([list(result.raw.values()) for result in results])
     return [
         NAMES[fault],
         _three(np.sqrt((online**2).mean(axis=0))),
         _three(online.max(axis=0)),
         " / ".join(str(most) for most in TARGET.values()),
+        _three(np.sqrt((raw**2).mean(axis=0))),
         _three(np.sqrt((revised**2).mean(axis=0))),
         sum(len(result.run.stamps) for result in results),
         round(sum(result.travelled for result in results)),

@@ -167,6 +167,11 @@ class LoopResult:
         return _rmse(self.run.poses, self.run.truth)
 
     @property
+    def raw(self) -> dict[str, float]:
+        """RMSE of the base's own odometry, wheels and gyroscope, from the same start."""
+        return _rmse(self.run.odometry, self.run.truth)
+
+    @property
     def late(self) -> float:
         """Share of the world's steps that were done more than 20 ms after their time."""
         return self.record.late / max(self.record.steps, 1)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from types import TracebackType
 from typing import Literal, Protocol, Self
 
+from contourslam.closing import Closing
 from contourslam.errors import ContourslamError
 from contourslam.recordings.picture import Picture
 from contourslam.robot.base.states import BaseState
@@ -121,7 +121,7 @@ def openers(config: RobotConfig, *, patience: float = 30.0, rate: float = 2.0) -
     return Openers(lidar, base, None if config.camera is None else camera)
 
 
-class Robot:
+class Robot(Closing):
     """The robot; a context manager. Its motors are stopped first when it is left, whatever the reason.
 
     A part that fails is told of and tried again, and the others go on.
@@ -166,11 +166,6 @@ class Robot:
         for thread in self._threads.values():
             thread.start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Stop the motors, then everything else."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.kernels import kernel
+from contourslam.scene.occlusion import crossing
 from contourslam.scene.surface import Surface
 
 Floats = NDArray[np.float64]
@@ -101,12 +102,7 @@ def sights(eye: Floats, angles: Floats, blocks: Floats, reach: float) -> Floats:
         dx, dy = math.cos(angles[n]), math.sin(angles[n])
         best = reach
         for b in range(blocks.shape[0]):
-            ax, ay = blocks[b, 0] - eye[0], blocks[b, 1] - eye[1]
-            sx, sy = blocks[b, 2] - blocks[b, 0], blocks[b, 3] - blocks[b, 1]
-            across = dx * sy - dy * sx
-            if across == 0.0:
-                continue
-            distance, place = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
+            distance, place = crossing(eye, dx, dy, blocks[b])
             if 0.0 < distance < best and 0.0 <= place <= 1.0:
                 best = distance
         length = best + _BEHIND if best < reach else 0.0

@@ -24,6 +24,17 @@ def occluders(surfaces: tuple[Surface, ...]) -> Floats:
 
 
 @kernel
+def crossing(eye: Floats, dx: float, dy: float, block: Floats) -> tuple[float, float]:
+    """Where a ray in the plane meets a block: share of the ray's own length, and of the block's; NaN if never."""
+    ax, ay = block[0] - eye[0], block[1] - eye[1]
+    sx, sy = block[2] - block[0], block[3] - block[1]
+    across = dx * sy - dy * sx
+    if across == 0.0:
+        return np.nan, np.nan
+    return (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
+
+
+@kernel
 def visible(eye: Floats, places: Floats, blocks: Floats, margin: float, clearance: float) -> NDArray[np.bool_]:
     """Tell which places a camera sees past what stands in the room.
 
@@ -51,21 +62,16 @@ def visible(eye: Floats, places: Floats, blocks: Floats, margin: float, clearanc
         if length < 1e-9:
             continue
         for b in range(blocks.shape[0]):
-            ax, ay = blocks[b, 0] - eye[0], blocks[b, 1] - eye[1]
+            part, place = crossing(eye, dx, dy, blocks[b])
+            if not 0.0 < part < 1.0:
+                continue
             sx, sy = blocks[b, 2] - blocks[b, 0], blocks[b, 3] - blocks[b, 1]
-            across = dx * sy - dy * sx
-            if across == 0.0:
-                continue
-            part, place = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
-            if part <= 0.0 or part >= 1.0:
-                continue
-            side = margin / math.sqrt(sx * sx + sy * sy)
+            wide = math.sqrt(sx * sx + sy * sy)
+            side = margin / wide
             if place < -side or place > 1.0 + side or eye[2] + part * dz > blocks[b, 4] + margin:
                 continue
             # How far the place is in front of or behind the block's own line.
-            if (1.0 - part) * length < clearance or (1.0 - part) * abs(across) < clearance * math.sqrt(
-                sx * sx + sy * sy
-            ):
+            if (1.0 - part) * min(length, abs(dx * sy - dy * sx) / wide) < clearance:
                 continue
             seen[n] = False
             break

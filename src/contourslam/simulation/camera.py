@@ -5,12 +5,11 @@ sees, and every pixel of the picture is looked up in them along its own ray.
 """
 
 import math
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contourslam.closing import Closing
 from contourslam.errors import ConfigError, MissingExtraError, ResultError
 from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.geometry.rigid import from_planar
@@ -31,7 +30,7 @@ Bytes = NDArray[np.uint8]
 _RIM = math.radians(1.5)  # within which the picture fades to black at the edge of the lens' view
 
 
-class FisheyeCamera:
+class FisheyeCamera(Closing):
     """A fisheye camera on the robot; a context manager.
 
     The graphics belong to the thread in which the first picture is taken: take all others there, and close it there.
@@ -170,14 +169,6 @@ class FisheyeCamera:
         if self._graphics is not None:
             self._graphics.close()
             self._graphics = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _place(self, T_world_base: Floats) -> None:
         """Put the robot there, so that its own body is where the camera sees it."""

@@ -5,9 +5,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from types import TracebackType
-from typing import Self
 
+from contourslam.closing import Closing
 from contourslam.robot.base.commander import Commander
 from contourslam.robot.base.link import BOOT, MegaLink
 from contourslam.robot.base.messages import Ack, Hello, HelloReply, State
@@ -30,7 +29,7 @@ _KEPT = 500  # states that wait for a reader
 _MOST_RESETS, _RESET_SPAN = 3, 60.0  # more than so many in so many seconds is a supply that does not hold
 
 
-class MegaBase:
+class MegaBase(Closing):
     """The base on a serial port; a context manager that stops the robot at the end, also at an error or Ctrl-C.
 
     A thread of its own reads the base and sends it the wanted twist 50 times a second, as long as the caller wants it
@@ -93,14 +92,6 @@ class MegaBase:
         self.info: HelloReply = self._link.open()
         self._thread = threading.Thread(target=self._run, name="base", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def name(self) -> str:

@@ -1,11 +1,10 @@
 """What every source of pictures offers, wherever they come from."""
 
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
-from types import TracebackType
-from typing import Self
 
+from contourslam.closing import Closing
 from contourslam.recordings.picture import Picture
 
 
@@ -14,7 +13,7 @@ def never() -> bool:
     return False
 
 
-class PictureSource(ABC):
+class PictureSource(Closing):
     """A source of pictures; a context manager that frees it at the end.
 
     Attributes
@@ -58,14 +57,6 @@ class PictureSource(ABC):
     def close(self) -> None:
         """Free the source; no error, for one that has gone is closed too."""
         return
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def paced(pictures: Iterator[Picture], stopped: Callable[[], bool]) -> Iterator[Picture]:

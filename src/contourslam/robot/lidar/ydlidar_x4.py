@@ -5,9 +5,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from contourslam.closing import Closing
 from contourslam.robot.device_errors import (
     DeviceBaudError,
     DeviceError,
@@ -64,7 +64,7 @@ class Health:
     code: int
 
 
-class YdlidarX4:
+class YdlidarX4(Closing):
     """A YDLidar X4 on a serial port; a context manager that stops the lidar and its motor at the end.
 
     Parameters
@@ -117,14 +117,6 @@ class YdlidarX4:
         self.name = ""
         self._port: Any = None
         self._open()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _open(self) -> None:
         self.name = self._wanted or find_port(LIDAR)

@@ -7,9 +7,8 @@ import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from contourslam.closing import Closing
 from contourslam.errors import ContourslamError
 
 AT_REST = (0, 0, 0, 0, 0, 9807, 0, 0, 0)
@@ -61,7 +60,7 @@ class BoardFigures:
     resets: int
 
 
-class SimulatedBoard:
+class SimulatedBoard(Closing):
     """An Arduino Mega that executes a firmware, in a process of its own.
 
     Parameters
@@ -90,14 +89,6 @@ class SimulatedBoard:
         self._position = (0, 0)
         self._rest = 0.0
         self.figures: BoardFigures | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def step(
         self,

@@ -5,12 +5,11 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import repeat
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.closing import Closing
 from contourslam.robot.lidar.x4_packets import correction_deg
 from contourslam.simulation.hardware.line import Damage, Line
 from contourslam.simulation.hardware.x4 import SAMPLES_PER_SECOND, X4
@@ -34,7 +33,7 @@ def measured(raw_deg: Floats, ranges: Callable[[Floats], Floats]) -> Floats:
     return np.asarray(np.rint(mm))
 
 
-class PluggedX4:
+class PluggedX4(Closing):
     """A lidar that stands still in a room; a context manager.
 
     Parameters
@@ -78,14 +77,6 @@ class PluggedX4:
         self._mutex = threading.Lock()  # held while the line is plugged, unplugged or used
         self._thread = threading.Thread(target=self._run, name="X4", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def plug(self) -> None:
         """Plug it in again: idle, as after power on."""

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from multiprocessing.connection import Connection
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from contourslam.closing import Closing
 from contourslam.errors import ContourslamError
 from contourslam.simulation.hardware.line import Damage
 from contourslam.simulation.hardware.live_world import Board, LiveWorld, Record, WorldConfig
@@ -22,7 +22,7 @@ _BEFORE_OTHERS = -10
 _LISTEN = 10  # steps between two looks for orders
 
 
-class RunningWorld:
+class RunningWorld(Closing):
     """A world that runs from its making to :meth:`finish`; a context manager.
 
     Parameters
@@ -63,14 +63,6 @@ class RunningWorld:
         self._record: Record | None = None
         self.start: Pose = self._answer(_READY)
         """True pose at the start: x (m), y (m), heading (rad)."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def unplug_lidar(self, seconds: float) -> None:
         """Pull the lidar's cable, and plug it in again so much later."""
