@@ -4,6 +4,7 @@ import sys
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from time import thread_time
 
 import numpy as np
@@ -12,11 +13,12 @@ from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.detectors import Detector
 from contourslam.errors import ConfigError, MapError, RecordingError
-from contourslam.geometry.poses import between, compose, interpolate
+from contourslam.geometry.poses import interpolate
 from contourslam.maps.saved_map import NOT_CONTINUABLE, SavedMap
 from contourslam.scan import LaserScan, Odometry, TruePose
+from contourslam.slam.gathering import Mapped, gather
 from contourslam.slam.mapper import Mapper
-from contourslam.slam.result import OdometryReadings, RunResult, ScanUpdate
+from contourslam.slam.result import RunResult, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 
 Message = LaserScan | Odometry | TruePose
@@ -181,7 +183,7 @@ def replay(
     watch = Stopwatch()
     slam: Mapper | None = None
     # What each scan gave, raw odometry there, readings before it: one list, so that Ctrl-C cannot come between two.
-    done: list[tuple[ScanUpdate, Floats, int]] = []
+    done: list[Mapped] = []
     readings = array("d")  # four numbers each: a log may hold some hundred thousand
     truth: list[TruePose] = []
     skipped: Counter[str] = Counter()
@@ -211,7 +213,7 @@ def replay(
                 skipped[BLIND] += 1
             watch.start()
             update = slam.push_scan(message)
-            done.append((update, slam.odometry_pose, len(readings) // 4))
+            done.append(Mapped(update, slam.odometry_pose, len(readings) // 4))
             if on_scan is not None:
                 on_scan(message, update)
     except KeyboardInterrupt:
@@ -237,55 +239,19 @@ def _pose_at(truth: list[TruePose], stamps: Floats) -> Floats:
 def _result(
     config: Config,
     slam: Mapper,
-    done: list[tuple[ScanUpdate, Floats, int]],
+    done: list[Mapped],
     numbers: "array[float]",
     truth: list[TruePose],
     watch: Stopwatch,
     skipped: dict[str, int],
     complete: bool,
 ) -> RunResult:
-    updates = [update for update, _, _ in done]
-    stamps = np.array([u.stamp for u in updates])
-    poses = np.array([u.pose for u in updates]).reshape(-1, 3)
-    covariances = np.array([u.covariance for u in updates]).reshape(-1, 3, 3)
-    raw = np.array([odometry for _, odometry, _ in done]).reshape(-1, 3)
-    readings = None
-    if len(raw):
-        blind = skipped.get(BLIND, 0)
-        raw[:blind] = raw[min(blind, len(raw) - 1)]  # the wheels' own origin is no motion
-        origin = raw[0]
-        raw = compose(slam.start_pose, between(origin, raw))
-        rows = np.array(numbers).reshape(-1, 4)
-        if len(rows) and blind < len(raw):
-            before = np.searchsorted([count for _, _, count in done], np.arange(len(rows)), side="right")
-            readings = OdometryReadings(rows[:, 0], compose(slam.start_pose, between(origin, rows[:, 1:])), before)
     watch.start()
     finished = slam.finish()
     watch("map refinement")  # "refinement" alone is that of corners
-    corners, walls = slam.corner_map(), slam.wall_map()
+    maps = slam.corner_map(), slam.wall_map()
     watch("map")
-    quality = [u.quality for u in updates if u.quality is not None]
-    counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64).reshape(-1, 4)
-    return RunResult(
-        detector=config.detector,
-        stamps=stamps,
-        poses=poses if finished is None else finished.poses,
-        covariances=covariances if finished is None else finished.covariances,
-        odometry=raw,
-        truth=_pose_at(truth, stamps) if truth and len(stamps) else None,
-        nis=np.array([u.nis for u in updates]),
-        nis_dof=counts[:, 3],
-        matched_count=counts[:, 0],
-        corner_count=counts[:, 1],
-        wall_count=counts[:, 2],
-        corner_map=corners,
-        wall_map=walls,
-        seconds=watch.seconds,
-        skipped=skipped,
-        complete=complete,
-        back_end=config.back_end,
-        online_poses=None if finished is None else poses,
-        quality=np.array(quality) if quality else None,
-        loops=() if finished is None else finished.loops,
-        readings=readings,
-    )
+    readings = np.array(numbers).reshape(-1, 4)
+    run = gather(config, done, readings, slam.start_pose, finished, maps, blind=skipped.get(BLIND, 0))
+    true = _pose_at(truth, run.stamps) if truth and len(run.stamps) else None
+    return replace(run, truth=true, seconds=watch.seconds, skipped=skipped, complete=complete)

@@ -3,8 +3,9 @@
 import math
 import sys
 import time
+from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from contourslam.robot.bring_up import Event, Robot
     from contourslam.robot.journey import Journey, Sight, Steer
     from contourslam.robot.live_map import LiveMap
-    from contourslam.slam.result import RunResult
 
 _REDRAW = 0.25  # s
 _STANDS = 2.0  # s at first, in which the gyroscope's bias is found and the map begins
@@ -136,11 +136,12 @@ class Drive:
         route = load_route(self.route)
         habits = PilotConfig(speed=self.speed, turn_limit=turn_rate)
         pilot = Pilot(sample_route(route.waypoints, closed=route.closed), closed=route.closed, config=habits)
-        begun: list[float] = []
+        stood = 0.0
 
         def along(sight: "Sight", dt: float) -> tuple[float, float]:
-            begun.append(time.monotonic()) if not begun else None
-            if time.monotonic() - begun[0] < _STANDS:
+            nonlocal stood
+            stood += dt
+            if stood < _STANDS:
                 return 0.0, 0.0
             return pilot.steer(sight.pose, dt, blind=sight.blind, sigma=sight.sigma)
 
@@ -151,11 +152,8 @@ class Drive:
         from contourslam.report.result_folder import write_result_folder
         from contourslam.report.run_page import write_run_page
 
-        skipped: dict[str, int] = {}
-        for trouble in journey.troubles:
-            if trouble.message:
-                skipped[f"{trouble.part}: {trouble.message}"] = skipped.get(f"{trouble.part}: {trouble.message}", 0) + 1
-        result: RunResult = replace(live_map.result(), skipped=skipped)
+        told = Counter(f"{trouble.part}: {trouble.message}" for trouble in journey.troubles if trouble.message)
+        result = live_map.result(dict(told))
         metrics = run_metrics(result)
         write_result_folder(self.output, result, settings, metrics, command=command)
         write_run_page(self.output, result, settings, metrics, command=command, name=self.output.resolve().name)

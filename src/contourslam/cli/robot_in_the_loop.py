@@ -45,7 +45,7 @@ class RobotInTheLoop:
         """Drive, write the report and say how it went."""
         from contourslam.experiments.loop_values import Firmware, LoopConfig, fault_named
         from contourslam.experiments.robot_in_the_loop import robot_in_the_loop
-        from contourslam.report.loop_page import kept, loop_metrics, write_loop_report
+        from contourslam.report.loop_page import TARGET, kept, loop_metrics, write_loop_report
 
         config = LoopConfig(
             self.seed, self.room, self.seconds, fault_named(self.fault), self.speed, self.pictures, self.settings
@@ -76,6 +76,6 @@ class RobotInTheLoop:
             complain("interrupted; the page shows what was done")
             return INTERRUPTED
         if not kept(result):
-            complain("the errors are larger than 3 cm and 0.01 rad")
+            complain(f"the errors are larger than {TARGET['x']} m or {TARGET['theta']} rad")
             return 1
         return 0

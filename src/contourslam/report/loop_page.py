@@ -109,12 +109,12 @@ def _headline(result: LoopResult) -> str:
         (
             f"{100.0 * result.online[name]:.1f} cm",
             f"error in {name}",
-            f"RMS as known at the time; at most {most} allowed",
+            f"RMS as known at the time; at most {100.0 * TARGET[name]:g} cm allowed",
         )
-        for name, most in (("x", "3 cm"), ("y", "3 cm"))
+        for name in ("x", "y")
     ]
     shown += [
-        (f"{result.online['theta']:.4f} rad", "error of the heading", "at most 0.01 rad allowed"),
+        (f"{result.online['theta']:.4f} rad", "error of the heading", f"at most {TARGET['theta']} rad allowed"),
         (
             f"{100.0 * result.late:.1f} %",
             "of the world's steps late",

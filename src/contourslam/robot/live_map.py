@@ -19,7 +19,8 @@ from contourslam.live.worker import Worker
 from contourslam.robot.config import RobotConfig
 from contourslam.robot.lidar.x4_turns import RANGE_MAX
 from contourslam.scan import LaserScan, Odometry
-from contourslam.slam.result import OdometryReadings, RunResult
+from contourslam.slam.gathering import Mapped, gather
+from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]
 _TURN_PER_M_DEG, _TURN_PER_RAD_DEG = 0.3, 0.6  # of a gyroscope whose bias was found at rest, and its scale
@@ -175,46 +176,14 @@ class LiveMap:
             What could not be used, by reason.
         complete : bool
         """
-        done = self._done
-        updates = [processed.update for processed, _ in done]
-        stamps = np.array([u.stamp for u in updates])
-        online = np.array([u.pose for u in updates]).reshape(-1, 3)
-        covariances = np.array([u.covariance for u in updates]).reshape(-1, 3, 3)
-        raw = np.array([processed.T_odom_base for processed, _ in done]).reshape(-1, 3)
-        readings = None
-        if len(raw):
-            origin = raw[0]
-            raw = compose(self._start, between(origin, raw))
-            rows = np.array([[r.stamp, *r.pose] for r in self._readings]).reshape(-1, 4)
-            before = np.searchsorted([count for _, count in done], np.arange(len(rows)), side="right")
-            readings = OdometryReadings(rows[:, 0], compose(self._start, between(origin, rows[:, 1:])), before)
+        mapped = [Mapped(done.update, done.T_odom_base, before) for done, before in self._done]
+        readings = np.array([[reading.stamp, *reading.pose] for reading in self._readings]).reshape(-1, 4)
         finished = self.session.finish()
-        whole = finished is not None and len(finished.poses) == len(online)  # not where another map was begun
-        quality = [u.quality for u in updates if u.quality is not None]
-        counts = np.array([(len(u.matched), u.corners, u.walls, u.nis_dof) for u in updates], dtype=np.int64)
-        counts = counts.reshape(-1, 4)
-        return RunResult(
-            detector=self._config.detector,
-            stamps=stamps,
-            poses=finished.poses if finished is not None and whole else online,
-            covariances=finished.covariances if finished is not None and whole else covariances,
-            odometry=raw,
-            truth=None,
-            nis=np.array([u.nis for u in updates]),
-            nis_dof=counts[:, 3],
-            matched_count=counts[:, 0],
-            corner_count=counts[:, 1],
-            wall_count=counts[:, 2],
-            corner_map=self.session.corner_map(),
-            wall_map=self.session.wall_map(),
-            skipped=dict(skipped or {}),
-            complete=complete,
-            back_end=self._config.back_end,
-            online_poses=online if whole else None,
-            quality=np.array(quality) if quality else None,
-            loops=finished.loops if finished is not None else (),
-            readings=readings,
-        )
+        if finished is not None and len(finished.poses) != len(mapped):
+            finished = None  # another map was begun on the way
+        maps = self.session.corner_map(), self.session.wall_map()
+        run = gather(self._config, mapped, readings, self._start, finished, maps)
+        return replace(run, skipped=dict(skipped or {}), complete=complete)
 
 
 def _apart(a: Floats, b: Floats) -> Floats:
