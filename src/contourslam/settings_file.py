@@ -1,7 +1,6 @@
 """Settings as YAML files: frozen classes written and read back, with an error that names the place of what is wrong."""
 
 import dataclasses
-import difflib
 import io
 import sys
 import types
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_or
 
 from contourslam.atomic import write_text
 from contourslam.errors import ConfigError
+from contourslam.nearest import perhaps, unreadable
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -88,7 +88,7 @@ def read_yaml(path: Path) -> Any:
     try:
         return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise ConfigError(unreadable(path, error)) from error
     except (YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: is not valid YAML ({' '.join(str(error).split())})") from error
 
@@ -117,7 +117,8 @@ def build(kind: type[T], content: Any, place: str = "") -> T:
     fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]  # any dataclass
     for name in content:
         if name not in fields:
-            raise ConfigError(f"unknown setting {place}{name}{_nearest(str(name), list(fields))}")
+            known = f"; known here: {', '.join(fields)}"
+            raise ConfigError(f"unknown setting {place}{name}{perhaps(str(name), fields) or known}")
     missing = [name for name, field in fields.items() if name not in content and not _has_default(field)]
     if missing:
         raise ConfigError(f"{place}{missing[0]} is missing")
@@ -127,11 +128,6 @@ def build(kind: type[T], content: Any, place: str = "") -> T:
 
 def _has_default(field: "dataclasses.Field[Any]") -> bool:
     return field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-
-
-def _nearest(name: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(known)}"
 
 
 def _value(kind: Any, value: Any, place: str) -> Any:

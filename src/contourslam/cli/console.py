@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Self, TextIO, TypeVar
 
 from contourslam.errors import ConfigError, ResultError
+from contourslam.nearest import no_such
 
 T = TypeVar("T")
 
@@ -85,7 +86,7 @@ def chosen(kind: str, name: str, choices: Mapping[str, T]) -> T:
         If the name is unknown.
     """
     if name not in choices:
-        raise ConfigError(f"there is no {kind} {name!r}; choose one of {', '.join(choices)}")
+        raise ConfigError(no_such(kind, name, choices))
     return choices[name]
 
 

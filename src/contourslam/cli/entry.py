@@ -11,6 +11,7 @@ from contourslam import __version__
 from contourslam.cli.console import colour_wanted, complain
 from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.errors import ConfigError, ContourslamError
+from contourslam.nearest import perhaps
 
 COMMANDS = {
     "simulate": "Simulate a robot in a furnished room and record it.",
@@ -121,7 +122,7 @@ def parse(arguments: Sequence[str]) -> Command:
     """
     name = arguments[0] if arguments else ""
     if name not in COMMANDS:
-        wrong = f"there is no command {name!r}; it" if name else "the command is missing; it"
+        wrong = f"there is no command {name!r}{perhaps(name, COMMANDS)}; it" if name else "the command is missing; it"
         raise ConfigError(f"{wrong} must be one of {', '.join(COMMANDS)} (`contourslam --help` explains them)")
     kind = command_class(name)
 

@@ -10,6 +10,7 @@ import tyro
 from contourslam.cli.console import Bar, complain, note, print_json
 from contourslam.cli.options import Flag, Json, Overwrite
 from contourslam.errors import ConfigError, RecordingError, ResultError
+from contourslam.nearest import near_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,7 +123,8 @@ def _map(folder: Path) -> "SavedMap":
 
     if not folder.is_dir():
         raise ResultError(
-            f"{folder}: there is no such result folder; `contourslam run RECORDING -o {folder}` writes one"
+            f"{folder}: there is no such result folder{near_file(folder)}; "
+            f"`contourslam run RECORDING -o {folder}` writes one"
         )
     if (folder / "map.cmap").exists():
         return load_map(folder / "map.cmap")

@@ -9,6 +9,7 @@ from contourslam.detectors.suppression import suppress
 from contourslam.detectors.teh_chin import TehChin
 from contourslam.detectors.wu import Wu
 from contourslam.errors import ConfigError
+from contourslam.nearest import no_such
 
 DETECTORS: dict[str, Callable[[bool], Detector]] = {
     "matched_filter": MatchedFilter,
@@ -35,7 +36,7 @@ def make_detector(name: str, *, adapted: bool = True) -> Detector:
         If there is no such detector; the message lists those there are.
     """
     if name not in DETECTORS:
-        raise ConfigError(f"there is no detector {name!r}; choose one of {', '.join(DETECTORS)}")
+        raise ConfigError(no_such("detector", name, DETECTORS))
     return DETECTORS[name](adapted)
 
 

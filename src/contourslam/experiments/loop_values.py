@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError
 from contourslam.evaluation.errors import rmse
+from contourslam.nearest import no_such
 from contourslam.recordings.picture import Picture
 from contourslam.robot.bring_up import Trouble
 from contourslam.simulation.hardware.board import BoardError
@@ -48,7 +49,7 @@ class LoopConfig:
 
     def __post_init__(self) -> None:
         if self.room not in ROOMS:
-            raise ConfigError(f"there is no room {self.room!r}; choose one of {', '.join(ROOMS)}")
+            raise ConfigError(no_such("room", self.room, ROOMS))
         if not self.seconds >= 5.0:
             raise ConfigError(f"LoopConfig.seconds must be at least 5, got {self.seconds!r}")
 
@@ -64,7 +65,7 @@ def fault_named(name: str) -> Fault:
     for fault in FAULTS:
         if fault == name:
             return fault
-    raise ConfigError(f"there is no fault {name!r}; choose one of {', '.join(FAULTS)}")
+    raise ConfigError(no_such("fault", name, FAULTS))
 
 
 @dataclass(frozen=True, slots=True)

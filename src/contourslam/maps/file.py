@@ -14,6 +14,7 @@ from contourslam.maps.consistency import problems
 from contourslam.maps.layout import VERSION, Array, layouts, misshapen, to_arrays, to_map
 from contourslam.maps.saved_map import SavedMap
 from contourslam.maps.table import HEADER_AT, MOST_HEADER, Section, beginning, damaged, header_text, read_table
+from contourslam.nearest import unreadable
 
 SUFFIX = ".cmap"
 PIECE = 1 << 18  # bytes that are packed at a time
@@ -73,8 +74,7 @@ def load_map(path: Path) -> SavedMap:
             about, sections = read_table(path, file)
             arrays = {section.name: _read(path, file, section) for section in sections}
     except OSError as error:
-        reason = error.strerror or error
-        raise MapError(f"{path}: cannot be read ({reason}); `contourslam run RECORDING -o DIR` writes maps") from error
+        raise MapError(f"{unreadable(path, error)}; `contourslam run RECORDING -o DIR` writes maps") from error
     saved = to_map(arrays, about)
     places = {section.name: section.offset for section in sections}
     for name, problem in problems(saved):

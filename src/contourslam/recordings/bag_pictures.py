@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError, RecordingError
 from contourslam.geometry.fisheye import FisheyeModel
+from contourslam.nearest import perhaps
 from contourslam.recordings.mount import FrameTree
 from contourslam.recordings.picture import Picture, encoding_of
 from contourslam.recordings.png import encode_png
@@ -114,7 +115,10 @@ class BagPictures:
             for name in topics:
                 if name.lstrip("/") == wanted.lstrip("/"):
                     return name
-            raise RecordingError(f"{self._storage.path}: has no pictures on {wanted}; topics of pictures: {listed}")
+            near = perhaps(wanted, topics)
+            raise RecordingError(
+                f"{self._storage.path}: has no pictures on {wanted}{near}; topics of pictures: {listed}"
+            )
         if len(topics) < 2:
             return topics[0] if topics else None
         if _PREFERRED in topics:

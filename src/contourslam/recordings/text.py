@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.errors import RecordingError
+from contourslam.nearest import unreadable
 
 _GZIP_MAGIC = b"\x1f\x8b"
 _XZ_MAGIC = b"\xfd7zXZ\x00"
@@ -31,7 +32,7 @@ def first_bytes(path: Path, count: int) -> bytes:
         with path.open("rb") as file:
             head = file.read(count)
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise RecordingError(unreadable(path, error)) from error
     if not head:
         raise RecordingError(f"{path}: the file is empty")
     return head

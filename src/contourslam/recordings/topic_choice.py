@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from contourslam.errors import RecordingError
+from contourslam.nearest import perhaps
 from contourslam.recordings.recording import Topic
 from contourslam.recordings.ros_messages import (
     ODOMETRY,
@@ -66,7 +67,8 @@ def _named(path: Path, topics: list[Topic], wanted: str, types: tuple[str, ...],
                 f"{path}: the {role} topic {wanted} holds {topic.message_type}, not {' or '.join(types)}; "
                 + _listing(topics)
             )
-    raise RecordingError(f"{path}: has no topic {wanted} for the {role}; {_listing(topics)}")
+    near = perhaps(wanted, [topic.name for topic in topics])
+    raise RecordingError(f"{path}: has no topic {wanted} for the {role}{near}; {_listing(topics)}")
 
 
 def _clear_choice(path: Path, candidates: list[str], preferred: str, role: str) -> str:

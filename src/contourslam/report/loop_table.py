@@ -8,6 +8,7 @@ import numpy as np
 
 from contourslam.atomic import write_text
 from contourslam.errors import ResultError
+from contourslam.nearest import unreadable
 from contourslam.slam.result import Loop
 
 _POSE = ("x", "y", "theta")
@@ -67,7 +68,7 @@ def read_loop_table(path: Path) -> tuple[Loop, ...]:
     try:
         lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise ResultError(unreadable(path, error)) from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: is not a table of loops ({error})") from error
     if not lines or tuple(lines[0]) != COLUMNS:

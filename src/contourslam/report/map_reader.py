@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.errors import ResultError
+from contourslam.nearest import unreadable
 from contourslam.report.map_files import FORMAT, USUAL_ALONG, across_variances, normals, spread
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
@@ -40,7 +41,7 @@ def read_geojson(path: Path) -> tuple[CornerMap, WallMap]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise ResultError(unreadable(path, error)) from error
     except (ValueError, RecursionError) as error:
         raise ResultError(f"{path}: is not valid JSON ({error}); write it again with `contourslam run`") from error
     try:

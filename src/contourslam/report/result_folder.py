@@ -13,6 +13,7 @@ from contourslam import __version__
 from contourslam.atomic import make_folder, remove, write_text
 from contourslam.config import Config
 from contourslam.errors import RecordingError, ResultError
+from contourslam.nearest import near_file, unreadable
 from contourslam.recordings.trajectories import read_trajectory, write_trajectory
 from contourslam.report.loop_table import read_loop_table, write_loop_table
 from contourslam.report.map_files import write_geojson
@@ -146,7 +147,8 @@ def read_result_folder(folder: Path) -> StoredRun:
     """
     if not folder.is_dir():
         raise ResultError(
-            f"{folder}: there is no such result folder; `contourslam run RECORDING -o {folder}` writes one"
+            f"{folder}: there is no such result folder{near_file(folder)}; "
+            f"`contourslam run RECORDING -o {folder}` writes one"
         )
     metrics = read_metrics(folder / "metrics.json")
     corners, walls = read_geojson(folder / "map.geojson")
@@ -204,8 +206,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
     try:
         metrics = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        reason = error.strerror or error
-        raise ResultError(f"{path}: cannot be read ({reason}); is it in a folder that run wrote?") from error
+        raise ResultError(f"{unreadable(path, error)}; is it in a folder that run wrote?") from error
     except (ValueError, RecursionError) as error:
         raise ResultError(f"{path}: is not valid JSON ({error})") from error
     if not isinstance(metrics, dict):

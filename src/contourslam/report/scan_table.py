@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from contourslam.atomic import write_text
 from contourslam.errors import ResultError
+from contourslam.nearest import unreadable
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 
@@ -92,7 +93,7 @@ def read_scan_table(path: Path) -> tuple[RunResult, NDArray[np.float64] | None]:
     try:
         lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise ResultError(unreadable(path, error)) from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: is not a table of scans ({error})") from error
     names = tuple(lines[0]) if lines else ()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
+from contourslam.nearest import unreadable
 
 Floats = NDArray[np.float64]
 SPACING = 0.01
@@ -95,8 +96,10 @@ def load_route(path: Path) -> Route:
     """
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    except OSError as error:
+        raise ConfigError(unreadable(path, error)) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is no text ({error})") from error
     try:
         return _from_csv(text) if path.suffix.lower() == ".csv" else _from_yaml(text)
     except ConfigError as error:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from contourslam.nearest import near_file
 from contourslam.recordings.picture import Picture
 from contourslam.recordings.text import first_bytes
 from contourslam.robot.camera.pi import PiCamera
@@ -92,7 +93,9 @@ def open_source(
         return VideoCamera(device, width=width, height=height, rate=rate, patience=patience, clock=clock)
     path = Path(name)
     if not path.exists():
-        raise DeviceNotFoundError(f"{name}: there is no such file, folder or camera; {video_devices()}")
+        raise DeviceNotFoundError(
+            f"{name}: there is no such file, folder or camera{near_file(path)}; {video_devices()}"
+        )
     if path.is_dir() or first_bytes(path, 16).startswith(_BAGS):
         return KeptPictures(path, pace=pace)
     return Film(path, pace=pace)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contourslam.errors import RecordingError
+from contourslam.nearest import unreadable
 from contourslam.recordings.picture import Picture
 from contourslam.robot.camera.opencv import encode_jpeg, opencv
 from contourslam.robot.camera.source import PictureSource, never, paced
@@ -228,7 +229,7 @@ class Film(PictureSource):
             with path.open("rb") as file:
                 file.read(1)
         except OSError as error:
-            raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from error
+            raise RecordingError(unreadable(path, error)) from error
         self._open()
 
     def _open(self) -> None:
