@@ -6,6 +6,8 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
+from contourslam.report.page.shell import shell
+
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -131,9 +133,16 @@ def tiles(figures: Sequence[tuple[str, str, str]]) -> str:
 
 
 def page(
-    title: str, *, lead: str, sections: Sequence[Section], footer: str, banner: str = "", summary: str = ""
+    title: str,
+    *,
+    lead: str,
+    sections: Sequence[Section],
+    footer: str,
+    banner: str = "",
+    summary: str = "",
+    scripts: Sequence[str] = (),
 ) -> str:
-    """Give the whole page, its style inside.
+    """Give the whole page, its style and scripts inside.
 
     Parameters
     ----------
@@ -145,16 +154,17 @@ def page(
         A warning above it all.
     summary : str
         HTML between the opening words and the contents, such as tiles.
+    scripts : sequence of str
+        What this page runs beside what every page does (:func:`contourslam.report.page.shell.shell`).
 
     Returns
     -------
     str
     """
-    resources = files("contourslam.report.page")
-    template = Template(resources.joinpath("template.html").read_text(encoding="utf-8"))
+    template = Template(files("contourslam.report.page").joinpath("template.html").read_text(encoding="utf-8"))
     return template.substitute(
         title=escape(title),
-        style=resources.joinpath("style.css").read_text(encoding="utf-8"),
+        **shell(scripts),
         banner=f'<p class="warning" role="status">{escape(banner)}</p>' if banner else "",
         lead=paragraph(lead, "lead") + summary,
         contents="\n".join(f'<li><a href="#{escape(s.anchor)}">{escape(s.title)}</a></li>' for s in sections),
