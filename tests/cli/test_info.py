@@ -3,9 +3,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from contourslam.cli import main
+from contourslam.recordings import write_recording
+from contourslam.scan import evenly_spaced
 
 
 def test_info_counts_what_is_in_a_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -27,6 +30,20 @@ def test_info_says_how_to_map_a_log(log: Path, capsys: pytest.CaptureFixture[str
     assert "60 in 11.8 s, 5 Hz" in text
     assert "180 a scan, -90.0° to 89.0°" in text
     assert f"contourslam run {log} -o out" in text
+
+
+def test_info_says_how_to_map_a_recording_without_odometry(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "no_wheels"
+    beams = np.linspace(2.0, 3.0, 90)
+    scans = [
+        evenly_spaced(0.1 * k, beams, angle_min=-1.5, angle_increment=1 / 30, range_min=0.1, range_max=10.0)
+        for k in range(3)
+    ]
+    write_recording(path, scans)
+    assert main(["info", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "the scans alone must do" in text
+    assert f"contourslam run {path} -o out" in text
 
 
 def test_info_names_the_damage_and_counts_what_came_before(

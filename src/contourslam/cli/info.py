@@ -137,8 +137,8 @@ def _print(found: dict[str, Any]) -> None:
         print(f"{'note:':<16}{text}")
     if found["damage"]:
         print(f"{'damage:':<16}{found['damage']}")
-    if found["missing"]:
-        print(f"it lacks {' and '.join(found['missing'])}: it cannot be mapped")
+    if "scans" in found["missing"]:
+        print("it holds no scan: it cannot be mapped")
     else:
         print(f"map it with: contourslam run {found['recording']} -o out")
 
