@@ -7,6 +7,7 @@ from importlib.resources import files
 from string import Template
 
 from contourslam.report.page.shell import shell
+from contourslam.report.page.tables import to_csv, to_latex
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +65,21 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def table(caption: str, headers: Sequence[str], rows: Sequence[Row]) -> str:
-    """Give a table with a caption and header cells; it scrolls by itself where it is wider than the page."""
+    """Give a table with a caption and header cells, to be copied as CSV or LaTeX; it scrolls where it is too wide."""
     head = "".join(f'<th scope="col">{escape(header)}</th>' for header in headers)
     body = "\n".join(_row(row) for row in rows)
     return (
         f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
-        f"<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>"
+        f"<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>\n"
+        f'<p class="copy" hidden>{_copy("CSV", to_csv(headers, rows))} '
+        f'{_copy("LaTeX", to_latex(caption, headers, rows))} <span role="status"></span></p>'
     )
+
+
+def _copy(form: str, text: str) -> str:
+    """Give the button that copies a text; ``tables.js`` makes it do so. A browser drops a carriage return as it is."""
+    held = escape(text).replace("\r", "&#13;")
+    return f'<button type="button" data-text="{held}">Copy as {form}</button>'
 
 
 def _row(row: Row) -> str:

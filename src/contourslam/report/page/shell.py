@@ -5,7 +5,7 @@ import hashlib
 from collections.abc import Sequence
 from importlib.resources import files
 
-SCRIPTS = ("theme.js", "folds.js")
+SCRIPTS = ("theme.js", "folds.js", "tables.js")
 """What runs on every page, files beside this one."""
 
 
