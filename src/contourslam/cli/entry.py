@@ -34,6 +34,8 @@ COMMANDS = {
     "camera": "Look at a camera, and keep pictures of it.",
     "calibrate": "Find out how a robot is built: wheels, the camera's lens and place.",
     "warm-up": "Compile everything before the robot drives.",
+    "doctor": "Say what is installed, which devices there are, and whether the mapping works.",
+    "completion": "Print what makes a shell complete commands and options.",
 }
 """Name of each command with a summary; :func:`command_class` finds what it does."""
 

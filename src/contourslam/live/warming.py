@@ -4,6 +4,7 @@ A kernel is compiled, or read from Numba's cache, at its first call. On a robot 
 """
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -36,6 +37,27 @@ def warm_up(config: Config, mapper: Mapper | None = None, *, laps: float = 3.25)
         How far.
     """
     mapper = mapper or make_mapper(config)
+    for odometry, scan, _ in made_up_drive(laps):
+        mapper.push_odometry(odometry)
+        mapper.push_scan(scan)
+    mapper.corner_map()
+    mapper.wall_map()
+    mapper.finish()
+
+
+def made_up_drive(laps: float) -> Iterator[tuple[Odometry, LaserScan, Floats]]:
+    """Make up a drive through the ring of corridors.
+
+    Parameters
+    ----------
+    laps : float
+        How far; between `BLIND` the lidar sees nothing.
+
+    Yields
+    ------
+    tuple of (Odometry, LaserScan, ndarray)
+        The wheels, which slip, and a scan, both of one moment; the true pose, shape (3,), m and rad.
+    """
     walls = np.concatenate([_sides(OUTER), _sides(INNER)])
     last: Floats | None = None
     odometry = np.zeros(3)
@@ -48,12 +70,8 @@ def warm_up(config: Config, mapper: Mapper | None = None, *, laps: float = 3.25)
             dx, dy = pose[0] - last[0], pose[1] - last[1]
             ahead, aside = (cos * dx + sin * dy) * (1.0 + SLIP), -sin * dx + cos * dy
             odometry = compose(odometry, np.array([ahead, aside, (pose[2] - last[2]) * (1.0 + SLIP)]))
-        mapper.push_odometry(Odometry(stamp, odometry))
-        mapper.push_scan(_scan(stamp, pose, walls if sees else walls[:0]))
+        yield Odometry(stamp, odometry), _scan(stamp, pose, walls if sees else walls[:0]), pose
         last = pose
-    mapper.corner_map()
-    mapper.wall_map()
-    mapper.finish()
 
 
 def _sides(corners: tuple[tuple[float, float], ...]) -> Floats:
