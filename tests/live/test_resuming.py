@@ -45,7 +45,7 @@ def grown(monkeypatch: pytest.MonkeyPatch, scan_at: ScanAt) -> Callable[..., tup
         after = Follower()
 
         def go_on(
-            saved: Any, covariance: Floats, config: Config, *, initial_pose: Floats, lidar_mount: Any
+            saved: Any, covariance: Floats, config: Config, *, initial_pose: Floats, lidar_mount: Any, lap: Any
         ) -> Follower:
             after.start = initial_pose, covariance
             return after

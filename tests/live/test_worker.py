@@ -83,3 +83,32 @@ def test_an_error_in_the_thread_is_told_and_stopping_still_works(stream: Callabl
         assert told.wait(60.0)
         assert [str(error) for error in failures] == ["a bug"]
     worker.stop()
+
+
+def test_who_looks_on_is_told_after_the_pose_is_handed_on_and_works_while_no_scan_waits(
+    stream: Callable[..., Any],
+) -> None:
+    session = mapping(EKF, LiveConfig(wait=2.0, max_waiting=100), clock=time.monotonic)
+    happened: list[tuple[str, float]] = []
+    rested = threading.Event()
+
+    class Watching:
+        def take(self, processed: Processed) -> None:
+            happened.append(("taken", processed.stamp))
+
+        def rest(self) -> None:
+            happened.append(("rest", session.due(time.monotonic()) or 1.0))
+            rested.set()
+
+    def hand_on(processed: Processed) -> None:
+        happened.append(("handed on", processed.stamp))
+
+    worker = Worker(session, hand_on, clock=time.monotonic, failed=lambda error: None, onlooker=Watching())
+    for _, message in stream(1.0).messages:  # all of them wait as it begins
+        (worker.push_scan if isinstance(message, LaserScan) else worker.push_odometry)(message)
+    worker.start()
+    assert rested.wait(60.0)
+    worker.stop()
+    first = [what for what, _ in happened].index("rest")
+    assert first >= 18 and [what for what, _ in happened[:first]] == ["handed on", "taken"] * (first // 2)
+    assert all(due > 0.0 for what, due in happened if what == "rest")

@@ -10,9 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contourslam.config import Config, SlamConfig
-from contourslam.scan import Odometry, TruePose
+from contourslam.config import Config, LiveConfig, SlamConfig
+from contourslam.live.session import Session
+from contourslam.live.start import mapping
+from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.view.access import new_token
+from contourslam.view.followed import Followed
 from contourslam.view.pace import Pace
 from contourslam.view.replayed import Replayed
 from contourslam.view.server import ViewServer
@@ -83,3 +86,54 @@ def served(replayed) -> Iterator[Callable[..., tuple[Replayed, ViewServer]]]:
             return one, server
 
         yield make
+
+
+class LiveRobot:
+    """A live session that is watched, on a clock of its own; each message of the drive comes at its stamp.
+
+    Attributes
+    ----------
+    now : float
+        s.
+    """
+
+    def __init__(self, messages, *, session: Session | None = None, config: Config = SETTINGS, **more) -> None:
+        self.now = 0.0
+        self._messages = iter(messages)
+        self.followed = Followed(config, title="robot", clock=lambda: self.now, **more)
+        self.session = session or mapping(config, LiveConfig(), clock=lambda: self.now)
+        self.followed.follow(self.session, np.zeros(3))
+
+    def go(self, scans: int) -> None:
+        """Let so many scans come, and be mapped."""
+        while scans > 0:
+            message = next(self._messages, None)
+            if message is None:
+                return
+            if isinstance(message, TruePose):
+                continue
+            self.now = max(self.now, message.stamp - 100.0)
+            if isinstance(message, LaserScan):
+                self.session.push_scan(message, self.now)
+                scans -= 1
+            else:
+                self.session.push_odometry(message, self.now)
+            self.work()
+
+    def wait(self, seconds: float) -> None:
+        """Let time go by in which nothing comes."""
+        self.now += seconds
+        self.work()
+
+    def work(self) -> None:
+        """Do what the worker's thread does."""
+        while done := self.session.poll(self.now, at_most=1):
+            for processed in done:
+                self.followed.take(processed)
+        self.followed.rest()
+
+
+@pytest.fixture
+def live(drive) -> Callable[..., LiveRobot]:
+    """Robots on the drive."""
+    return lambda scans=40, **more: LiveRobot(drive(scans), **more)

@@ -79,11 +79,30 @@ def test_to_play_from_the_end_is_to_begin_again(memory: Memory) -> None:
     assert cursor.moment().index == 0
 
 
-def test_a_robot_that_is_driving_cannot_be_paused_but_looked_back_at(memory: Memory) -> None:
+def test_of_a_robot_a_page_holds_nothing_but_what_it_shows(memory: Memory) -> None:
+    held, other = Cursor(memory, None), Cursor(memory, None)
+    newest = memory.newest
+    held.obey(Request("pause"), ended=False)
+    memory.add(Moment(100, 10.0, 0.0, NOTHING, np.zeros(3), None, ()))
+    held.advance(60.0)
+    assert held.moment() is newest and held.pace.paused
+    assert other.moment() is memory.newest and not other.pace.paused
+    held.obey(Request("step", -10.0), ended=False)
+    assert held.moment().index == 89
+    held.obey(Request("speed", 2.0), ended=False)
+    held.obey(Request("play"), ended=False)
+    held.advance(0.5)
+    assert held.moment().index == 99
+    held.obey(Request("pause"), ended=False)
+    held.obey(Request("follow"), ended=False)
+    assert held.moment() is memory.newest and not held.pace.paused
+
+
+def test_of_a_robot_nobody_looks_beyond_now(memory: Memory) -> None:
     cursor = Cursor(memory, None)
-    for what in ("pause", "play", "speed"):
-        cursor.obey(Request(what, 1.0), ended=False)
     cursor.obey(Request("step", -1.0), ended=False)
-    assert cursor.moment().index == 98
-    cursor.advance(1.0)
-    assert cursor.moment() is memory.newest
+    assert cursor.moment().index == 98 and cursor.pace.paused
+    cursor.obey(Request("step", 10.0), ended=False)
+    assert cursor.moment() is memory.newest and cursor.pace.paused  # it is held there
+    cursor.obey(Request("seek", 500.0), ended=False)
+    assert cursor.at is None and not cursor.pace.paused

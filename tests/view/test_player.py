@@ -41,7 +41,9 @@ def test_the_last_map_is_that_of_the_run(back_end, drive, replayed) -> None:
     arrays = one.player.lanes[0].draw(one.show.memory.knot_scans())
     assert arrays["corner_ids"].tolist() == known.corner_map.ids.tolist()
     np.testing.assert_allclose(arrays["corners"], known.corner_map.positions, atol=2e-3)
-    np.testing.assert_allclose(arrays["path"], known.poses[one.show.memory.knot_scans()], atol=2e-3)
+    # A filter's poses stay what they were at the time, which the knots have.
+    now = arrays["path"] if back_end == "graph" else [knot.lanes[0, :3] for knot in one.show.memory.knots(0)]
+    np.testing.assert_allclose(now, known.poses[one.show.memory.knot_scans()], atol=2e-3)
     assert len(arrays["corner_ids"]) >= 4
 
 

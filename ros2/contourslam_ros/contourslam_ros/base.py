@@ -15,8 +15,8 @@ from tf2_msgs.msg import TFMessage
 from contourslam.errors import ConfigError
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.recordings.ros_messages import stamp_of
+from contourslam.robot.base.health import BaseHealth, base_values, motion_words
 from contourslam.robot.base.mega import MegaBase
-from contourslam.robot.base.messages import IMPOSSIBLE_STEP, STALLED
 from contourslam.robot.base.states import BaseState
 from contourslam.robot.device_errors import DeviceError
 from contourslam_ros.device_messages import (
@@ -34,7 +34,6 @@ from contourslam_ros.running import run
 from contourslam_ros.settings import declare
 
 AGAIN = 0.05  # s between two of the driver's being told the same; it holds a command for 0.35 s
-SILENT = 0.5  # s without a word of the base that are worth one
 AVERAGED = 0.02  # s over which the base averages gyroscope and accelerometer
 ACCELERATION_SIGMA = 0.02  # m/s², of that average: 0.003 m/s² per root Hz by an MPU-9250's data sheet
 COMPASS_SIGMA = 1e-6  # T
@@ -57,8 +56,7 @@ class Base(DeviceNode):
             self._config.named(name) for name in (self._config.odom_frame, self._config.base_frame)
         )
         self._base: MegaBase | None = None
-        self._state: BaseState | None = None
-        self._flags, self._slipped = 0, False  # since the last diagnostics
+        self._health = BaseHealth()
         self._heard = self._battery_told = 0.0
         self._wanted: tuple[float, float] | None = None
         self._until = 0.0
@@ -83,8 +81,8 @@ class Base(DeviceNode):
             self._base = base
             try:
                 for state in base.states(stopped):
-                    self._state, self._heard = state, time.monotonic()
-                    self._flags, self._slipped = self._flags | state.flags, self._slipped or state.odometry.slipping
+                    self._heard = time.monotonic()
+                    self._health.take(state)
                     self.well()
                     self._publish(state)
             finally:
@@ -140,40 +138,13 @@ class Base(DeviceNode):
 
     def diagnostics(self) -> Sequence[Diagnostic]:
         """Say how the base is."""
-        base, state = self._base, self._state
+        base, state = self._base, self._health.state
         if base is None or state is None:
             return (Diagnostic(Level.ERROR, "base", self.unanswered),)
-        info, silent = base.info, time.monotonic() - self._heard
-        bias, _ = base.gyro_bias
-        values = {
-            "port": base.name,
-            "firmware": f"{info.major}.{info.minor}.{info.patch}",
-            "frames": str(base.frames),
-            "lost frames": str(base.lost),
-            "resets": str(base.resets),
-            "opened anew": str(base.reconnections),
-            "stopped by its watchdog": str(base.watchdog_stops),
-            "stopped by a motor that does not turn": str(base.stalls),
-            "gyroscope's bias (rad/s)": f"{bias:.5f}",
-            "battery (V)": "not wired" if state.battery is None else f"{state.battery:.2f}",
-        }
-        if warnings := self._warnings(state, silent):
+        values = base_values(base, state)
+        if warnings := self._health.warnings(time.monotonic() - self._heard):
             return (Diagnostic(Level.WARN, "base", "; ".join(warnings), values),)
-        speed = f"{state.odometry.speed:.2f} m/s, {state.odometry.turn_rate:.2f} rad/s"
-        return (Diagnostic(Level.OK, "base", speed, values),)
-
-    def _warnings(self, state: BaseState, silent: float) -> list[str]:
-        impossible, stalled, slipped = bool(self._flags & IMPOSSIBLE_STEP), bool(self._flags & STALLED), self._slipped
-        self._flags, self._slipped = 0, False
-        found = {
-            f"no word from the base for {silent:.1f} s; check its plug, its cable and its power": silent > SILENT,
-            "the battery is low: charge it": state.battery_low,
-            "the IMU does not answer, so that the wheels alone tell how it turns; check its wires": state.gyro is None,
-            "an encoder steps impossibly; check its wires and their distance from the motors": impossible,
-            "a motor does not turn, or its encoder does not count, and the base has stopped": stalled,
-            "wheels and gyroscope do not agree: a wheel slips, or the gyroscope's axes are wrong in config.h": slipped,
-        }
-        return [trouble for trouble, is_so in found.items() if is_so]
+        return (Diagnostic(Level.OK, "base", motion_words(state), values),)
 
 
 def _is_heard(publisher: Publisher) -> bool:

@@ -1,12 +1,13 @@
 """What a session stands on, handed to it so that it works over any mapper and any way of keeping maps."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from contourslam.contour.contours import Floats
 from contourslam.live.outlines import Outlines, outlines
 from contourslam.maps.saved_map import SavedMap
+from contourslam.replay import Stopwatch
 from contourslam.slam.mapper import Mapper
 
 
@@ -41,6 +42,8 @@ class Backing:
         The map never changes: localisation.
     guesses : bool
         The mapper finds motion from the scans where the odometry is silent; else it waits for the odometry to catch up.
+    stopwatch : Stopwatch
+        What the mappers tell the end of each stage.
     """
 
     begin: Callable[[], Mapper]
@@ -54,3 +57,4 @@ class Backing:
     outlines: Callable[[Mapper, int], Outlines] = outlines
     fixed: bool = False
     guesses: bool = True
+    stopwatch: Stopwatch = field(default_factory=Stopwatch)

@@ -1,6 +1,7 @@
 """A mapper and the odometry that is handed to it: scan by scan, and on to another mapper where the robot is lost."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,8 @@ class Step:
         Whether the mapper knows where the robot is.
     blind : bool
         There was no odometry for this scan.
+    seconds : mapping
+        CPU time of each stage, s.
     """
 
     update: ScanUpdate
@@ -42,6 +45,7 @@ class Step:
     T_own_odom: Floats | None
     localized: bool
     blind: bool
+    seconds: Mapping[str, float]
 
     @property
     def correction(self) -> Floats:
@@ -95,8 +99,12 @@ class Course:
         blind = last is None or item.scan.stamp - self._lag - last.stamp > STALE
         if blind and self._backing.guesses:
             self._odometry.bridge()  # or else the motion found without it would count twice when it returns
+        watch = self._backing.stopwatch
+        watch.seconds.clear()
+        watch.start()
         update = self.mapper.push_scan(item.scan)
-        return Step(update, np.array(self.mapper.odometry_pose), self._odometry.T_own_odom, self.localized, blind)
+        odometry, T_own_odom = np.array(self.mapper.odometry_pose), self._odometry.T_own_odom
+        return Step(update, odometry, T_own_odom, self.localized, blind, dict(watch.seconds))
 
     @property
     def localized(self) -> bool:

@@ -1,5 +1,6 @@
 """What one scan gave in live use, and the map between two."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from contourslam.contour.contours import Floats
@@ -38,6 +39,8 @@ class Processed:
     scan : LaserScan
     latency : float
         From the scan's coming to its pose, on the caller's clock, s.
+    seconds : mapping
+        CPU time of each stage of the mapping, s.
     """
 
     stamp: float
@@ -52,6 +55,7 @@ class Processed:
     incidents: tuple[Incident, ...]
     scan: LaserScan
     latency: float
+    seconds: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)

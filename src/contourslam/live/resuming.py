@@ -35,6 +35,8 @@ class Resuming:
         ``T_base_lidar``; that of the configuration by default.
     begin : callable, optional
         Makes the mapper of a new map, which is begun after `give_up_after` in vain; never by default.
+    lap : callable, optional
+        Called with the name of each stage when it is done, for those who measure time.
 
     Raises
     ------
@@ -51,9 +53,10 @@ class Resuming:
         initial_pose: Floats | None = None,
         lidar_mount: Floats | None = None,
         begin: Callable[[], Mapper] | None = None,
+        lap: Callable[[str], None] = lambda stage: None,
     ) -> None:
-        self._saved, self._config, self._live, self._mount = saved, config, live, lidar_mount
-        self._localizer = Localizer(saved, config, initial_pose=initial_pose, lidar_mount=lidar_mount)
+        self._saved, self._config, self._live, self._mount, self._lap = saved, config, live, lidar_mount, lap
+        self._localizer = Localizer(saved, config, initial_pose=initial_pose, lidar_mount=lidar_mount, lap=lap)
         self._mapper: Mapper = self._localizer
         self._readings: deque[Odometry] = deque(maxlen=KEPT)
         self._begin = begin
@@ -137,7 +140,7 @@ class Resuming:
 
     def _continued(self, found: ScanUpdate) -> Mapper:
         return continue_mapper(
-            self._saved, found.covariance, self._config, initial_pose=found.pose, lidar_mount=self._mount
+            self._saved, found.covariance, self._config, initial_pose=found.pose, lidar_mount=self._mount, lap=self._lap
         )
 
     def _hand_over(self, mapper: Mapper, scan: LaserScan) -> ScanUpdate:

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from contourslam.config import LiveConfig
 from contourslam.contour.contours import Floats
@@ -17,6 +18,7 @@ from contourslam.live.figures import Mapped, Rate
 from contourslam.live.leisure import Leisure
 from contourslam.live.outlines import Outlines
 from contourslam.live.processed import Drawn, Processed
+from contourslam.live.resuming import Resuming
 from contourslam.live.smoothing import Smoother
 from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
@@ -25,6 +27,7 @@ from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.mapper import Finished, Mapper
 
 __all__ = ["Drawn", "Processed", "Session"]
+T = TypeVar("T")
 
 
 class Session:
@@ -186,7 +189,7 @@ class Session:
             return Processed(
                 update.stamp, update.pose, update.covariance, step.raw_odometry, step.to_odom(correction),
                 step.to_odom(smooth), step.localized, update, self._version, self._synchroniser.tally.new(), item.scan,
-                latency,
+                latency, step.seconds,
             )  # fmt: skip
 
     def _explain(self, jump: TimeJump, item: Released) -> None:
@@ -226,6 +229,18 @@ class Session:
         """Give the keyframes' contours as they were drawn up last, and have them drawn up anew. Never waits itself."""
         self._leisure.want_outlines()
         return self._leisure.outlines
+
+    def inspect(self, look: Callable[[Mapper], T]) -> T:
+        """Let somebody look at the mapper while it rests, and give what he found; he must change nothing.
+
+        Parameters
+        ----------
+        look : callable
+            Given the mapper; that of a map that goes on, once it does.
+        """
+        with self._work:
+            mapper = self._course.mapper
+            return look(mapper.standing[0] if isinstance(mapper, Resuming) else mapper)
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""

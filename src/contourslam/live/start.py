@@ -18,7 +18,7 @@ from contourslam.localization.known_map import KnownMap
 from contourslam.localization.locate import Locator
 from contourslam.maps.file import load_map, save_map
 from contourslam.maps.saved_map import SavedMap
-from contourslam.replay import keep_map, make_mapper
+from contourslam.replay import Stopwatch, keep_map, make_mapper
 from contourslam.slam.mapper import Mapper
 
 
@@ -57,9 +57,10 @@ def mapping(
     ContourslamError
         If the map cannot be read or continued, or a setting or an extra is missing.
     """
+    watch = Stopwatch()
 
     def begin(pose: Floats | None = initial_pose) -> Mapper:
-        return make_mapper(config, initial_pose=pose, lidar_mount=lidar_mount)
+        return make_mapper(config, initial_pose=pose, lidar_mount=lidar_mount, lap=watch)
 
     def keep(mapper: Mapper) -> SavedMap:
         about = {
@@ -74,14 +75,14 @@ def mapping(
         known = keep(mapper)
         if config.back_end != "graph" or known.keyframes is None or not len(known.keyframes):
             return begin(initial_pose if pose is None else pose)
-        return Resuming(known, config, live, initial_pose=pose, lidar_mount=lidar_mount, begin=begin)
+        return Resuming(known, config, live, initial_pose=pose, lidar_mount=lidar_mount, begin=begin, lap=watch)
 
     def go_on(saved: SavedMap, pose: Floats | None = None) -> Mapper:
         if config.back_end != "graph":
             raise ConfigError(f"a map is continued by the graph, not by {config.back_end}; choose --back-end graph")
         if saved.relations is None:
             raise MapError("this map cannot be continued, it holds landmarks alone; localise in it, or map anew")
-        return Resuming(saved, config, live, initial_pose=pose, lidar_mount=lidar_mount)
+        return Resuming(saved, config, live, initial_pose=pose, lidar_mount=lidar_mount, lap=watch)
 
     first = None
     if map_file is not None:
@@ -93,7 +94,7 @@ def mapping(
     backing = Backing(
         begin=begin, first=first, lost=lost, localized=lambda m: not isinstance(m, Resuming) or m.localized, keep=keep,
         open=go_on, write=save_map, read=load_map,
-        guesses=config.back_end == "graph" or config.slam.contour_matching,
+        guesses=config.back_end == "graph" or config.slam.contour_matching, stopwatch=watch,
     )  # fmt: skip
     return Session(
         backing, live, odometry_lag=config.slam.odometry_lag, autosave=autosave, clock=clock, topics=topics,
@@ -133,9 +134,10 @@ def localization(
     """
     current = load_map(map_file)
     finder = Locator(KnownMap(current))  # made ready once: a robot that is lost must not wait for it
+    watch = Stopwatch()
 
     def begin(pose: Floats | None = initial_pose) -> Mapper:
-        return Localizer(current, config, finder=finder, initial_pose=pose, lidar_mount=lidar_mount)
+        return Localizer(current, config, finder=finder, initial_pose=pose, lidar_mount=lidar_mount, lap=watch)
 
     def lost(mapper: Mapper, pose: Floats | None) -> Mapper:
         return begin(pose)
@@ -143,7 +145,7 @@ def localization(
     def open_map(saved: SavedMap) -> Mapper:
         nonlocal current, finder
         ready = Locator(KnownMap(saved))
-        mapper = Localizer(saved, config, finder=ready, lidar_mount=lidar_mount)
+        mapper = Localizer(saved, config, finder=ready, lidar_mount=lidar_mount, lap=watch)
         current, finder = saved, ready
         return mapper
 
@@ -153,6 +155,7 @@ def localization(
     backing = Backing(
         begin=begin, lost=lost, localized=localized, keep=lambda mapper: current, open=open_map, write=save_map,
         read=load_map, outlines=lambda mapper, version: outlines(mapper, version, current), fixed=True,
+        stopwatch=watch,
     )  # fmt: skip
     return Session(
         backing, live, odometry_lag=config.slam.odometry_lag, clock=clock, topics=topics,

@@ -2,11 +2,22 @@
 
 import threading
 from collections.abc import Callable
+from typing import Protocol
 
 from contourslam.live.session import Processed, Session
 from contourslam.scan import LaserScan, Odometry
 
 LONGEST = 1.0  # s between two looks, for what must be saved
+
+
+class Onlooker(Protocol):
+    """Who watches the mapping. It works in the mapping's own thread, so it must be quick, and it may raise nothing."""
+
+    def take(self, processed: Processed) -> None:
+        """Take in what a scan gave; it has been handed on by then."""
+
+    def rest(self) -> None:
+        """Do what can wait: no scan does. Called at least every second in which none comes."""
 
 
 class Worker:
@@ -21,6 +32,7 @@ class Worker:
         What the session's `now` comes from: ``time.monotonic``.
     failed : callable
         Called in the worker's thread with an error that is not a known failure, with which the work ends.
+    onlooker : Onlooker, optional
     """
 
     def __init__(
@@ -30,8 +42,10 @@ class Worker:
         *,
         clock: Callable[[], float],
         failed: Callable[[BaseException], None],
+        onlooker: Onlooker | None = None,
     ) -> None:
         self._session, self._done, self._clock, self._failed = session, done, clock, failed
+        self._onlooker = onlooker
         self._news = threading.Event()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="contourslam", daemon=True)
@@ -66,7 +80,13 @@ class Worker:
                     self._news.wait(LONGEST if due is None else min(due, LONGEST))
                 self._news.clear()
                 # One at a time, so that a pose does not wait for the scans that queue behind it.
-                for processed in self._session.poll(self._clock(), at_most=1):
+                mapped = self._session.poll(self._clock(), at_most=1)
+                for processed in mapped:
                     self._done(processed)
+                if self._onlooker is not None:
+                    for processed in mapped:
+                        self._onlooker.take(processed)
+                    if not mapped:
+                        self._onlooker.rest()
         except BaseException as error:  # nobody else hears of it in a thread
             self._failed(error)

@@ -176,6 +176,11 @@ class Robot(Closing):
                 thread.join(5.0)
 
     @property
+    def parts(self) -> tuple[PartName, ...]:
+        """Names of the parts it has."""
+        return tuple(self._threads)
+
+    @property
     def troubles(self) -> dict[PartName, str]:
         """Parts that do not work now, with what is wrong."""
         return dict(self._troubles)

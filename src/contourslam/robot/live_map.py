@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from array import array
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from contourslam.geometry.poses import between, compose
 from contourslam.live.processed import Processed
 from contourslam.live.session import Session
 from contourslam.live.start import mapping
-from contourslam.live.worker import Worker
+from contourslam.live.worker import Onlooker, Worker
 from contourslam.robot.config import RobotConfig
 from contourslam.robot.lidar.x4_turns import RANGE_MAX
 from contourslam.scan import LaserScan, Odometry
@@ -73,6 +74,12 @@ class LiveMap:
         Of the base at its first scan; the origin by default.
     autosave : Path, optional
         Where the map is saved by itself.
+    onlooker : callable, optional
+        Given the session before its first scan, and `lidar_mount`, gives who watches the mapping.
+    keeps : bool
+        Keep what :meth:`result` needs, which grows with every scan; off for a robot that is only watched.
+    expects_odometry : bool
+        False for a lidar without a base.
     clock : callable
         One that nobody sets, s.
     """
@@ -85,19 +92,27 @@ class LiveMap:
         lidar_mount: tuple[float, float, float],
         initial_pose: Floats | None = None,
         autosave: Path | None = None,
+        onlooker: Callable[[Session, Floats], Onlooker] | None = None,
+        keeps: bool = True,
+        expects_odometry: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._config = config
+        self._config, self._keeps = config, keeps
         self.session: Session = mapping(
-            config, live, autosave=autosave, initial_pose=initial_pose, lidar_mount=np.array(lidar_mount), clock=clock
-        )
+            config, live, autosave=autosave, initial_pose=initial_pose, lidar_mount=np.array(lidar_mount), clock=clock,
+            expects_odometry=expects_odometry,
+        )  # fmt: skip
         self._start = np.zeros(3) if initial_pose is None else np.asarray(initial_pose, dtype=np.float64)
         self._error: BaseException | None = None
         self._clock, self._mapped_at, self._leapt_at = clock, math.inf, -math.inf
-        self._worker = Worker(self.session, self._take, clock=clock, failed=self._fail)
+        watching = None if onlooker is None else onlooker(self.session, np.array(lidar_mount))
+        self._worker = Worker(self.session, self._take, clock=clock, failed=self._fail, onlooker=watching)
         self._lock = threading.Lock()
-        self._done: list[tuple[Processed, int]] = []
-        self._readings: list[Odometry] = []
+        self._last: Processed | None = None
+        self._newest: Odometry | None = None
+        self._done: list[Mapped] = []
+        self._latencies = array("d")
+        self._readings = array("d")  # four numbers each: fifty a second, for hours
         self._worker.start()
 
     def push(self, message: LaserScan | Odometry) -> None:
@@ -111,10 +126,12 @@ class LiveMap:
         if self._error is not None:
             raise self._error
         if isinstance(message, Odometry):
-            if self._readings and _leaps(self._readings[-1], message):
+            if self._newest is not None and _leaps(self._newest, message):
                 with self._lock:
                     self._leapt_at = message.stamp
-            self._readings.append(message)
+            self._newest = message
+            if self._keeps:
+                self._readings.extend((message.stamp, *message.pose.tolist()))
             self._worker.push_odometry(message)
         else:
             self._worker.push_scan(message)
@@ -122,7 +139,10 @@ class LiveMap:
     def _take(self, processed: Processed) -> None:
         self._mapped_at = self._clock()
         with self._lock:
-            self._done.append((processed, len(self._readings)))
+            self._last = processed
+            if self._keeps:
+                self._done.append(Mapped(processed.update, processed.T_odom_base, len(self._readings) // 4))
+                self._latencies.append(processed.latency)
             if processed.stamp >= self._leapt_at:
                 handed_on = compose(processed.T_map_odom_smooth, processed.T_odom_base)
                 if (_apart(processed.T_map_base, handed_on) < _SLACK).all():
@@ -139,8 +159,7 @@ class LiveMap:
     @property
     def last(self) -> Processed | None:
         """What the last scan gave; None before the first."""
-        with self._lock:
-            return self._done[-1][0] if self._done else None
+        return self._last
 
     def pose(self) -> tuple[float, float, float] | None:
         """Pose of the base at the newest odometry reading: x (m), y (m), heading (rad).
@@ -148,9 +167,9 @@ class LiveMap:
         None before the first scan, and from a leap of the odometry, as where the base's driver was started again, until
         the map has taken it in.
         """
-        if not self._readings or self._leapt_at > -math.inf:
+        newest = self._newest
+        if newest is None or self._leapt_at > -math.inf:
             return None
-        newest = self._readings[-1]
         T_map_odom = self.session.map_to_odom(newest.stamp)
         if T_map_odom is None:
             return None
@@ -161,14 +180,14 @@ class LiveMap:
     def latencies(self) -> Floats:
         """From each scan's coming to its pose, s, shape (t,)."""
         with self._lock:
-            return np.array([processed.latency for processed, _ in self._done])
+            return np.array(self._latencies)
 
     def close(self) -> None:
         """Let the last scan be mapped, and end the thread."""
         self._worker.stop()
 
     def result(self, skipped: dict[str, int] | None = None, *, complete: bool = True) -> RunResult:
-        """Give the run, revised at its end where the back end can; after :meth:`close`.
+        """Give the run, revised at its end where the back end can; after :meth:`close`, and where all was kept.
 
         Parameters
         ----------
@@ -176,8 +195,7 @@ class LiveMap:
             What could not be used, by reason.
         complete : bool
         """
-        mapped = [Mapped(done.update, done.T_odom_base, before) for done, before in self._done]
-        readings = np.array([[reading.stamp, *reading.pose] for reading in self._readings]).reshape(-1, 4)
+        mapped, readings = self._done, np.array(self._readings).reshape(-1, 4)
         finished = self.session.finish()
         if finished is not None and len(finished.poses) != len(mapped):
             finished = None  # another map was begun on the way

@@ -1,4 +1,4 @@
-"""Which moment a page looks at: the newest, or an earlier one that moves on while the replay goes on."""
+"""Which moment a page looks at: the newest, or an earlier one that moves on as time does."""
 
 import math
 
@@ -17,15 +17,19 @@ class Cursor:
     ----------
     memory : Memory
     pace : Pace or None
+        That of all pages; None where nobody sets one, as of a robot: then the page has one of its own, and whoever
+        pauses holds nothing but what the page shows.
 
     Attributes
     ----------
     at : float or None
         Time that is looked at, s; None for the newest, whatever comes.
+    pace : Pace
     """
 
     def __init__(self, memory: Memory, pace: Pace | None) -> None:
-        self._memory, self._pace = memory, pace
+        self._memory, self._shared = memory, pace is not None
+        self.pace = Pace() if pace is None else pace
         self.at: float | None = None
 
     def moment(self) -> Moment | None:
@@ -35,9 +39,9 @@ class Cursor:
     def advance(self, seconds: float) -> None:
         """Let so much time go by."""
         newest = self._memory.newest
-        if self.at is None or newest is None or (self._pace is not None and self._pace.paused):
+        if self.at is None or newest is None or self.pace.paused:
             return
-        speed = 1.0 if self._pace is None else self._pace.speed
+        speed = self.pace.speed
         self.at += seconds * (AGAIN if math.isinf(speed) else speed)
         if self.at >= newest.elapsed:
             self.at = None
@@ -52,40 +56,49 @@ class Cursor:
         ended : bool
             There will be no further moment: to play from the end is to begin again.
         """
-        pace, newest = self._pace, self._memory.newest
+        newest = self._memory.newest
         if request.do == "follow":
-            self.at = None
+            self._follow()
         elif request.do == "seek":
             self._seek(request.value, newest, ended=ended)
         elif request.do == "step" and newest is not None:
             self._step(int(request.value), newest)
-        elif pace is None:
-            return
         elif request.do == "pause":
-            pace.pause()
+            self._pause(newest)
         elif request.do == "play":
             if ended and (self.at is None or (newest is not None and self.at >= newest.elapsed)):
                 self.at = 0.0
-            pace.play()
+            self.pace.play()
         elif request.do == "speed":
-            pace.set_speed(request.value)
+            self.pace.set_speed(request.value)
+
+    def _follow(self) -> None:
+        self.at = None
+        if not self._shared:
+            self.pace.play()
+
+    def _pause(self, newest: Moment | None) -> None:
+        self.pace.pause()
+        if not self._shared and self.at is None and newest is not None:
+            self.at = newest.elapsed
 
     def _seek(self, time: float, newest: Moment | None, *, ended: bool) -> None:
         if newest is not None and time < newest.elapsed:
             self.at = max(time, 0.0)
-            return
-        self.at = None
-        if self._pace is not None and not ended:
-            self._pace.hurry(time)
+        elif not self._shared:
+            self._follow()
+        else:
+            self.at = None
+            if not ended:
+                self.pace.hurry(time)
 
     def _step(self, by: int, newest: Moment) -> None:
         looked_at = self.moment() or newest
-        if self._pace is not None:
-            self._pace.pause()
-            if by > 0 and looked_at.index == newest.index:
-                self.at = None
-                for _ in range(by):
-                    self._pace.step()
-                return
+        self.pace.pause()
+        if self._shared and by > 0 and looked_at.index == newest.index:
+            self.at = None
+            for _ in range(by):
+                self.pace.step()
+            return
         then = self._memory.beside(looked_at, by)
-        self.at = None if then.index == newest.index else then.elapsed
+        self.at = None if self._shared and then.index == newest.index else then.elapsed

@@ -1,7 +1,8 @@
-"""One back end with one detector: fed scan by scan, drawn up as a map every so often."""
+"""One back end with one detector, watched scan by scan, and drawn up as a map every so often."""
 
 import sys
-from collections.abc import Callable
+from array import array
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,11 +10,10 @@ from numpy.typing import NDArray
 
 from contourslam.config import Config
 from contourslam.contour.contours import Contours, Floats
-from contourslam.detectors import Detector
-from contourslam.replay import Stopwatch
-from contourslam.scan import LaserScan, Odometry
+from contourslam.geometry.poses import between_one, compose_one
+from contourslam.slam.look import Look
 from contourslam.slam.mapper import Mapper
-from contourslam.slam.result import Loop
+from contourslam.slam.result import Loop, ScanUpdate
 from contourslam.slam.slam import ContourSlam
 from contourslam.view.moment import LaneMoment, Sighting, sighting_of
 from contourslam.view.stories import Stories
@@ -38,82 +38,68 @@ def as_graph(mapper: Mapper) -> "GraphSlam | None":
 
 
 class Lane:
-    """A mapper and what is learnt by watching it.
+    """What is learnt by watching a mapper; changed in place by each scan.
 
     Parameters
     ----------
+    mapper : Mapper
+        Before its first scan.
     config : Config
         That of the mapper; its detector names the lane.
-    detector : Detector
-        The mapper's own.
-    make : callable
-        Makes the mapper; with the arguments of :func:`contourslam.replay.make_mapper`.
-    initial_pose, lidar_mount : ndarray, shape (3,), or None
+    mount : ndarray, shape (3,)
+        ``T_base_lidar``.
 
     Attributes
     ----------
-    mapper : Mapper
     stories : Stories
     loops : list of Loop
         Closed so far.
+    last_pose : ndarray, shape (3,)
+        Pose at the last scan as it was known then.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        detector: Detector,
-        make: Callable[..., Mapper],
-        initial_pose: Floats | None,
-        lidar_mount: Floats | None,
-    ) -> None:
-        self.config, self.detector = config, detector
-        self._watch = Stopwatch()
-        self.mapper = make(config, detector, initial_pose=initial_pose, lidar_mount=lidar_mount, lap=self._watch)
-        self.mount: Floats = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
+    def __init__(self, mapper: Mapper, config: Config, mount: Floats) -> None:
+        self.mapper, self.config, self.mount = mapper, config, mount
         self.stories = Stories()
         self.loops: list[Loop] = []
-        self._graph = as_graph(self.mapper)
+        self.last_pose: Floats = mapper.start_pose
+        self._graph = as_graph(mapper)
         # What shows more of its work than every mapper does.
-        self._watched = self.mapper if isinstance(self.mapper, ContourSlam) else self._graph
-        self._scan_at: dict[float, int] = {}
+        self._watched = mapper if isinstance(mapper, ContourSlam) else self._graph
+        self._stamps = array("d")  # of all scans: eight bytes each, for a drive may take hours
+        self._ties: list[tuple[int, int, int]] = []  # of each loop, numbers of its two scans and of its method
         self._sighting: Sighting | None = None
-        self._poses: list[Floats] = []
         self._milliseconds: dict[str, float] = {}
-        self._scans = 0
+        self._first_odometry: Floats | None = None
 
-    def push_odometry(self, odometry: Odometry) -> None:
-        """Hand on one reading."""
-        self.mapper.push_odometry(odometry)
+    def take(
+        self, update: ScanUpdate, seconds: Mapping[str, float], elapsed: float, *, localized: bool = True
+    ) -> LaneMoment:
+        """Take in a scan that the mapper has just mapped.
 
-    def push_scan(self, scan: LaserScan, elapsed: float) -> LaneMoment:
-        """Hand on one scan.
-
-        Raises
-        ------
-        ContourslamError
-            If the mapper cannot use it.
+        Parameters
+        ----------
+        update : ScanUpdate
+            What it said of it.
+        seconds : mapping of str to float
+            CPU time of each stage, s.
+        elapsed : float
+            When, s since the first scan.
+        localized : bool
+            Whether the mapper knows where the robot is.
         """
-        watch = self._watch
-        watch.seconds.clear()
-        watch.start()
-        update = self.mapper.push_scan(scan)
-        self._count_time(watch.seconds)
-        self._scan_at[scan.stamp] = len(self._poses)
-        self._poses.append(update.pose)
+        self._stamps.append(update.stamp)
+        self._count_time(seconds)
+        self.last_pose = update.pose
         if self._graph is not None:
-            self.loops += self._graph.loops(len(self.loops))
-        look = None if self._watched is None else self._watched.look
-        if look is not None and look.stamp == scan.stamp:
+            self._count_loops(self._graph.loops(len(self.loops)))
+        look = self.look
+        if look is not None and look.stamp == update.stamp:
             self._sighting = sighting_of(look, update.pose, self.mount)
             self.stories.take(elapsed, update, self._sighting)
         else:
             self.stories.take(elapsed, update, None)
-        return LaneMoment(update, self._sighting, tuple(self._milliseconds.items()))
-
-    @property
-    def last_pose(self) -> Floats:
-        """Pose at the last scan as it was known then, shape (3,)."""
-        return self._poses[-1]
+        return LaneMoment(update, self._sighting, tuple(self._milliseconds.items()), localized)
 
     @property
     def at_rest(self) -> bool:
@@ -124,13 +110,36 @@ class Lane:
         """Those of the last scan, in the lidar's frame; None where the mapper does not show them."""
         return None if self._watched is None else self._watched.contours
 
-    def _count_time(self, seconds: dict[str, float]) -> None:
-        self._scans += 1
-        weight = max(RECENT, 1.0 / self._scans)
+    @property
+    def look(self) -> Look | None:
+        """The newest look at the landmarks; None before the first, or where the mapper does not show it."""
+        return None if self._watched is None else self._watched.look
+
+    def odometry(self) -> Floats:
+        """Raw odometry at the last scan, moved so that it starts where the estimate starts, shape (3,)."""
+        if self._first_odometry is None:
+            self._first_odometry = np.array(self.mapper.odometry_pose)
+        return compose_one(
+            self.mapper.start_pose, between_one(self._first_odometry, np.array(self.mapper.odometry_pose))
+        )
+
+    def _count_time(self, seconds: Mapping[str, float]) -> None:
+        weight = max(RECENT, 1.0 / len(self._stamps))
         known = self._milliseconds
         for stage in dict.fromkeys((*known, *seconds)):  # in the order in which they were first met
             before = known.get(stage, 0.0)
             known[stage] = before + weight * (1e3 * seconds.get(stage, 0.0) - before)
+
+    def _count_loops(self, loops: tuple[Loop, ...]) -> None:
+        """Note which scans each loop ties; one to a place of an earlier drive has an end that is on no way here."""
+        if not loops:
+            return
+        self.loops += loops
+        stamps = np.frombuffer(self._stamps).copy()  # no view: it would keep the array from growing
+        for loop in loops:
+            ends = [np.flatnonzero(stamps == stamp) for stamp in (loop.earlier_stamp, loop.later_stamp)]
+            if all(len(found) for found in ends):
+                self._ties.append((int(ends[0][-1]), int(ends[1][-1]), METHODS.index(loop.method)))
 
     def draw(self, knots: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
         """Draw up the map, as arrays for the page.
@@ -143,7 +152,8 @@ class Lane:
         Returns
         -------
         dict
-            Corners, walls, poses of the knots and ends of the loops, as they stand now.
+            Corners, walls, poses of the knots and ends of the loops, as they stand now; no poses where they are what
+            they were at the time, which the knots have.
         """
         corners, walls = self.mapper.corner_map(), self.mapper.wall_map()
         path, ends = self._path(knots)
@@ -161,13 +171,12 @@ class Lane:
             "walls": walls.end_points.reshape(-1, 4).astype(np.float32),
             "path": path.astype(np.float32),
             "loops": ends.reshape(-1, 4).astype(np.float32),
-            "loop_methods": np.array([METHODS.index(loop.method) for loop in self.loops], dtype=np.uint8),
+            "loop_methods": np.array([method for _, _, method in self._ties], dtype=np.uint8),
         }
 
     def _path(self, knots: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """Poses of the knots as they stand now, and ends of the loops: shapes (k, 3) and (n, 2, 2)."""
         if self._graph is None:
-            return np.array([self._poses[i] for i in knots.tolist()]).reshape(-1, 3), np.empty((0, 2, 2))
+            return np.empty((0, 3)), np.empty((0, 2, 2))
         path = self._graph.path()
-        at = [(self._scan_at[loop.earlier_stamp], self._scan_at[loop.later_stamp]) for loop in self.loops]
-        return path[knots], path[np.array(at, np.int64).reshape(-1, 2), :2]
+        return path[knots], path[np.array(self._ties, np.int64).reshape(-1, 3)[:, :2], :2]

@@ -58,18 +58,24 @@ class Memory:
     def __init__(self, lanes: int, *, moments: int = MOMENTS, maps: int = MAPS, knots: int = KNOTS) -> None:
         self._lock = threading.Lock()
         self._most_moments, self._most_maps, self._most_knots = moments, maps, knots
-        self._moments: list[Moment] = []
-        self._times: list[float] = []
-        self._newest: Moment | None = None
-        self._stride, self._bytes = 1, 0
-        self._knots: list[Knot] = []
-        self._maps: list[list[MapDrawn]] = [[] for _ in range(lanes)]
-        self._latest_map: list[MapDrawn | None] = [None] * lanes
-        self._map_stride, self._map_bytes = 1, 0
         self._drawn = [0] * lanes
         self._events: list[dict[str, Any]] = []
         self._lost_events = 0
-        self.epoch = 0
+        self.epoch = -1
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all but the events: what is known by now lies in another map."""
+        with self._lock:
+            self._moments: list[Moment] = []
+            self._times: list[float] = []
+            self._newest: Moment | None = None
+            self._stride, self._bytes = 1, 0
+            self._knots: list[Knot] = []
+            self._maps: list[list[MapDrawn]] = [[] for _ in self._drawn]
+            self._latest_map: list[MapDrawn | None] = [None] * len(self._drawn)
+            self._map_stride, self._map_bytes = 1, 0
+            self.epoch += 1
 
     # Adding.
 

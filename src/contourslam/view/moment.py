@@ -89,11 +89,14 @@ class LaneMoment:
         The newest until then.
     stages : tuple of (str, float)
         CPU time per scan of each stage of late, ms.
+    localized : bool
+        Whether it knows where the robot is; else the pose is no more than a guess.
     """
 
     update: ScanUpdate
     sighting: Sighting | None
     stages: tuple[tuple[str, float], ...]
+    localized: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,11 +29,11 @@ class Painter:
 
     def __init__(self, config: Config, detectors: Sequence[Detector]) -> None:
         self._config, self._detectors = config, detectors
-        self._kept: OrderedDict[tuple[int, int], bytes] = OrderedDict()
+        self._kept: OrderedDict[tuple[int, float, int], bytes] = OrderedDict()
 
     def paint(self, moment: Moment, knots: int) -> bytes:
         """Give the message of a moment; `knots` is how many lie behind it."""
-        key = moment.index, knots
+        key = moment.index, moment.made, knots  # where a new map is begun, the scans are counted anew
         if key not in self._kept:
             self._kept[key] = self._paint(moment, knots)
             if len(self._kept) > KEPT:
@@ -77,6 +77,7 @@ class Painter:
             "looked": seen is not None and seen.stamp == update.stamp,
             "seen_corners": 0 if seen is None else seen.corners,
             "stages": lane.stages,
+            "localized": lane.localized,
         }
 
 

@@ -2,26 +2,21 @@
 
 import math
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from contourslam.contour.contours import Contours, Floats
+from contourslam.contour.contours import Floats
 from contourslam.errors import ContourslamError
-from contourslam.geometry.poses import between_one, compose_one, interpolate_one
-from contourslam.landmarks import trace
+from contourslam.geometry.poses import interpolate_one
 from contourslam.replay import Message
 from contourslam.scan import LaserScan, Odometry, TruePose
-from contourslam.view.draughtsman import Draughtsman
-from contourslam.view.knots import Knotter
-from contourslam.view.lane import Lane
+from contourslam.view.fed_lane import FedLane
+from contourslam.view.keeper import Keeper
 from contourslam.view.memory import Memory
-from contourslam.view.moment import Moment, trace_of
 from contourslam.view.pace import Pace
 
-LARGE = 0.05  # m by which a loop must move the robot to be told of
 TRUTHS = 64  # true poses that are kept for the next scan
 
 
@@ -42,10 +37,8 @@ class Player(threading.Thread):
         "starting", "mapping", "refining", "finished", or "failed".
     trouble : str
         What ended the recording early.
-    lanes : sequence of Lane
+    lanes : sequence of FedLane
         Empty before the first scan.
-    beams, returned : int
-        Of the last scan.
     error : Exception or None
         What nobody foresaw; the thread has ended by it.
     """
@@ -53,7 +46,7 @@ class Player(threading.Thread):
     def __init__(
         self,
         messages: Iterable[Message],
-        make_lanes: Callable[[Floats | None], Sequence[Lane]],
+        make_lanes: Callable[[Floats | None], Sequence[FedLane]],
         memory: Memory,
         pace: Pace,
     ) -> None:
@@ -61,14 +54,17 @@ class Player(threading.Thread):
         self._messages, self._make, self._memory, self._pace = messages, make_lanes, memory, pace
         self.state, self.trouble = "starting", ""
         self.error: Exception | None = None
-        self.lanes: Sequence[Lane] = ()
-        self.beams = self.returned = 0
-        self._draughtsman: Draughtsman | None = None
-        self._knotter: Knotter | None = None
+        self.lanes: Sequence[FedLane] = ()
+        self._keeper: Keeper | None = None
         self._waiting: list[Odometry] = []
         self._truth: deque[TruePose] = deque(maxlen=TRUTHS)
-        self._scans, self._began, self._elapsed = 0, math.nan, 0.0
-        self._first_odometry: Floats | None = None
+        self._began, self._elapsed = math.nan, 0.0
+
+    @property
+    def keeper(self) -> Keeper:
+        """What keeps the scans, from the first one on."""
+        assert self._keeper is not None
+        return self._keeper
 
     def run(self) -> None:
         """Play until the end, or until the pace says stop."""
@@ -109,41 +105,15 @@ class Player(threading.Thread):
             for reading in self._waiting:
                 lane.push_odometry(reading)
         self._waiting.clear()
-        before = [len(lane.loops) for lane in self.lanes]
         done = tuple(lane.push_scan(scan, elapsed) for lane in self.lanes)
-        contours = self._contours(scan)
-        self.beams, self.returned = len(scan.ranges), len(contours.points)
-        moment = Moment(
-            self._scans,
-            elapsed,
-            time.monotonic(),
-            trace_of(contours),
-            self._odometry(),
-            self._truth_at(scan.stamp),
-            done,
-        )
-        self._scans += 1
-        self._memory.add(moment)
-        self._keep(moment, before)
+        self.keeper.keep(scan, elapsed, done, self._truth_at(scan.stamp))
+        self.keeper.draughtsman.work(elapsed, idle=False)
         return True
 
     def _begin(self, scan: LaserScan) -> None:
         self._began = scan.stamp
         self.lanes = self._make(self._truth_at(scan.stamp))
-        self._knotter = Knotter(self.lanes[0].mount)
-        self._draughtsman = Draughtsman(self.lanes, self._memory)
-
-    def _contours(self, scan: LaserScan) -> Contours:
-        """Those that the first lane saw; all lanes differ in nothing but the detector."""
-        lane = self.lanes[0]
-        contours = lane.contours()
-        return trace(scan, lane.config, T_base_lidar=lane.mount) if contours is None else contours
-
-    def _odometry(self) -> Floats:
-        mapper = self.lanes[0].mapper
-        if self._first_odometry is None:
-            self._first_odometry = np.array(mapper.odometry_pose)
-        return compose_one(mapper.start_pose, between_one(self._first_odometry, np.array(mapper.odometry_pose)))
+        self._keeper = Keeper(self.lanes, self._memory)
 
     def _truth_at(self, stamp: float) -> Floats | None:
         if not self._truth:
@@ -151,40 +121,17 @@ class Player(threading.Thread):
         rows = sorted(self._truth, key=lambda t: t.stamp)
         return interpolate_one(np.array([t.stamp for t in rows]), np.array([t.pose for t in rows]), stamp, True)
 
-    def _keep(self, moment: Moment, loops_before: list[int]) -> None:
-        """Note what is worth a place on the way, or in the list of events."""
-        assert self._knotter is not None and self._draughtsman is not None
-        knot = self._knotter.take(moment)
-        if knot is not None and self._memory.add_knot(knot):
-            self._knotter.spacing *= 2.0
-        changed = knot is not None
-        for number, (lane, before) in enumerate(zip(self.lanes, loops_before, strict=True)):
-            moved = False
-            for loop in lane.loops[before:]:
-                shift = math.hypot(loop.shift[0], loop.shift[1])
-                moved |= shift > LARGE
-                if shift > LARGE or loop.method != "nearby":
-                    self._memory.add_event(
-                        moment.elapsed, "loop", f"loop by {loop.method}, {shift:.2f} m off", lane=number,
-                        x=float(lane.last_pose[0]), y=float(lane.last_pose[1]), shift=shift,
-                    )  # fmt: skip
-            update = moment.lanes[number].update
-            self._draughtsman.want(number, moved, changed or bool(update.born or update.dropped))
-        self._draughtsman.work(moment.elapsed, idle=False)
-
     def _idle(self) -> bool:
-        assert self._draughtsman is not None
-        return self._draughtsman.work(self._elapsed, idle=True)
+        return self.keeper.draughtsman.work(self._elapsed, idle=True)
 
     def _finish(self) -> None:
         """Refine what can be, and draw the last maps."""
-        assert self._draughtsman is not None
         self.state = "refining"
         for number, lane in enumerate(self.lanes):
             if self._pace.stopped:
                 return
             if lane.mapper.finish() is not None:
                 self._memory.add_event(self._elapsed, "refined", "the whole map was refined", lane=number)
-            self._draughtsman.draw(number, self._elapsed)
+            self.keeper.draughtsman.draw(number, self._elapsed)
         self.state = "finished"
         self._memory.add_event(self._elapsed, "finished", "the recording has ended")

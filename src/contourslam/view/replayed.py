@@ -1,6 +1,5 @@
 """A recording as a show: a player, its lanes, and what the pages are told of them."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,8 +11,8 @@ from contourslam.contour.contours import Floats
 from contourslam.detectors import make_detector
 from contourslam.errors import ConfigError
 from contourslam.replay import MakeMapper, Message, make_mapper
+from contourslam.view.fed_lane import FedLane
 from contourslam.view.lag import Lag
-from contourslam.view.lane import Lane
 from contourslam.view.memory import Memory
 from contourslam.view.pace import Pace
 from contourslam.view.painter import Painter
@@ -88,15 +87,15 @@ class Replayed:
             "back_end": config.back_end,
             "duration": duration,
             "mount": mount,
-            "can_pause": True,
+            "live": False,
             "max_false_negative_rate": config.slam.max_false_negative_rate,
         }
         painter = Painter(config, self._detectors)
         self.show = Show(about, self._memory, painter, self.pace, self._status, self._story)
 
-    def _make_lanes(self, start: Floats | None) -> Sequence[Lane]:
+    def _make_lanes(self, start: Floats | None) -> Sequence[FedLane]:
         return [
-            Lane(config, detector, self._make, start, self._mount)
+            FedLane(config, detector, self._make, start, self._mount)
             for config, detector in zip(self._configs, self._detectors, strict=True)
         ]
 
@@ -105,15 +104,13 @@ class Replayed:
         return {
             "state": player.state,
             "trouble": player.trouble,
-            "paused": pace.paused,
-            "speed": None if math.isinf(pace.speed) else pace.speed,
             "hurries_to": pace.hurries_to if player.state in ("starting", "mapping") else None,
             "reached": pace.reached(),
             "head": 0.0 if newest is None else newest.elapsed,
             "scans": 0 if newest is None else newest.index + 1,
             "scan_rate": pace.rate(),
-            "beams": player.beams,
-            "returned": player.returned,
+            "beams": 0 if newest is None else player.keeper.beams,
+            "returned": 0 if newest is None else player.keeper.returned,
             "lag": self.lag.summary(),
             "pages": self.lag.pages,
         }

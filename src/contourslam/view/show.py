@@ -16,7 +16,7 @@ class Show:
     Attributes
     ----------
     about : mapping
-        What never changes: title, lanes, length.
+        What pages are told at first, and again where the memory forgets: title, lanes, length.
     memory : Memory
     painter : Painter
     pace : Pace or None

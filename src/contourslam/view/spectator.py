@@ -1,6 +1,7 @@
 """One page that is open: it gets what it has not got yet, always the newest, and never more than it can draw."""
 
 import asyncio
+import math
 import time
 from collections import deque
 
@@ -156,5 +157,12 @@ class Spectator:
         show = self._show
         next_event, events = show.memory.events(self._events)
         self._events = next_event
-        status = {**show.status(), "at": self._cursor.at, "events": events}
+        pace = self._cursor.pace
+        own = {
+            "at": self._cursor.at,
+            "paused": pace.paused,
+            "speed": None if math.isinf(pace.speed) else pace.speed,
+            "events": events,
+        }
+        status = {**show.status(), **own}
         await self._connection.send(pack("status", status))
