@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
+.PHONY: help demo docs test test-docs test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -23,6 +23,13 @@ demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, wri
 
 test: $(VENV)/.dev ## Run the tests.
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+docs: $(VENV)/.docs ## Build the documentation site into site/.
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "Open site/index.html in a browser; $(BIN)/mkdocs serve makes its search work too."
+
+test-docs: $(VENV)/.dev $(VENV)/.docs ## Test the site, and every command in the documents; minutes.
+	$(BIN)/python -m pytest -n auto --dist worksteal tests_docs
 
 test-ros: $(VENV_ROS)/.ready ## Run the ROS 2 nodes against real rclpy, in an environment of its own (needs a C++ compiler).
 	$(VENV_ROS)/bin/python -m pytest tests_ros
@@ -54,8 +61,8 @@ bench-robot: $(VENV)/.dev firmware ## Measure the robot in the loop over five se
 	$(BIN)/python benchmarks/bench_robot.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
-	rm -rf $(VENV) $(VENV_ROS) .venv-peers firmware/mega/build demo robot-in-the-loop out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find src tests tests_ros ros2 firmware examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf $(VENV) $(VENV_ROS) .venv-peers site firmware/mega/build demo robot-in-the-loop out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests tests_docs tests_ros ros2 firmware examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or give it: make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -70,6 +77,11 @@ $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@echo "Installing contourslam, its libraries and the developer's tools into $(VENV), about a minute ..."
 	@$(PIP_INSTALL) '.[dev]'
 	@touch $(VENV)/.all $@
+
+$(VENV)/.docs: pyproject.toml | $(BIN)/python
+	@echo "Installing what builds the documentation into $(VENV) ..."
+	@$(PIP_INSTALL) '.[docs]'
+	@touch $@
 
 $(VENV_ROS)/.ready: pyproject.toml $(wildcard tests_ros/environment.sh tests_ros/requirements.txt ros2/contourslam_msgs/*/* tests_ros/tf2_msgs/*/*)
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed and was not found; give it: make PYTHON=/path/to/python3.12 test-ros" >&2; exit 1; }

@@ -2,6 +2,7 @@
 
 import math
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from contourslam.config import Config
@@ -36,7 +37,8 @@ def main() -> None:
         range_min=0.1,
         range_max=10.0,
     )
-    for name in DETECTORS:
+    _, grid = plt.subplots(2, 2, figsize=(8.0, 6.4), sharex=True, sharey=True, layout="constrained")
+    for name, axes in zip(DETECTORS, grid.flat, strict=True):
         found = detect(scan, make_detector(name), Config())
         corners = found.corners
         print(f"{name}: {len(corners.positions)} corners, {len(found.walls.end_points)} walls")
@@ -45,6 +47,12 @@ def main() -> None:
             sigma = 1e3 * math.sqrt(np.trace(covariance) / 2.0)
             kind = "convex" if convex else "concave"
             print(f"  at {x:6.3f} {y:6.3f} m, sigma {sigma:.1f} mm, opens {math.degrees(opening):5.1f}°, {kind}")
+        axes.set(title=name.replace("_", " "), aspect="equal")
+        points = axes.scatter(*found.curve.points.T, c=found.response, s=14, cmap="viridis", vmin=0.0)
+        axes.scatter(*corners.positions.T, marker="s", s=140, facecolor="none", edgecolor="tab:red")
+        axes.plot(0.0, 0.0, "^k")
+        plt.colorbar(points, ax=axes, label="response")
+    plt.show()
 
 
 if __name__ == "__main__":

@@ -7,12 +7,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from contourslam.config import Config, SlamConfig
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.recordings import open_recording, write_recording
 from contourslam.replay import replay
+from contourslam.report.occupancy import FREE, OCCUPIED
 from contourslam.report.result_folder import write_result_folder
 from contourslam.report.run_grid import run_grid
 
@@ -40,6 +42,22 @@ def main(arguments: list[str]) -> None:
 
     print(f"{len(result.stamps)} scans, {len(result.corner_map.ids)} corners, {len(result.wall_map.ids)} walls")
     print(f"{folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+
+    cells, (x, y) = grid.cells()
+    rows, columns = cells.shape
+    right, top = x + columns * grid.resolution, y + rows * grid.resolution
+    _, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
+    axes.imshow(
+        np.select([cells == OCCUPIED, cells == FREE], [0.0, 1.0], 0.8),
+        origin="lower",
+        extent=(x, right, y, top),
+        cmap="gray",
+    )
+    axes.plot(*result.poses[:, :2].T, color="tab:orange", label="the robot's way")
+    axes.plot(*result.corner_map.positions.T, "s", color="tab:red", fillstyle="none", label="corners")
+    axes.set(xlabel="x, m", ylabel="y, m")
+    axes.legend(loc="upper right")
+    plt.show()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ RESTS = 200  # times as long as it takes to make a map, no other is made
 class Autosave:
     """Writes a map every so often while it changes, in a thread of its own; changed in place.
 
-    A failure is kept in :attr:`trouble`, and the next try is made a period later.
+    A failure is kept in `trouble`, and the next try is made a period later.
 
     Parameters
     ----------

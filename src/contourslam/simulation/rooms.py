@@ -158,3 +158,4 @@ LARGE_HALL = Room(
 OFFICE_BUILDING = office_building(corridors=2, seed=4).room  # `long_drive` has larger ones
 
 ROOMS: dict[str, Room] = {room.name: room for room in (FURNISHED_ROOM, OFFICE_CORRIDOR, LARGE_HALL, OFFICE_BUILDING)}
+"""Name to room: those that the command line offers."""

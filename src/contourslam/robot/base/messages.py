@@ -63,7 +63,7 @@ class State:
     last_command : int
         Sequence of the last frame that was obeyed.
     flags : int
-        :data:`WATCHDOG` and the others, added up.
+        ``WATCHDOG`` and the others, added up.
     """
 
     time_us: int

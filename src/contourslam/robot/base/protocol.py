@@ -91,7 +91,7 @@ def decode(coded: bytes, accepted: tuple[type[Message], ...] = TO_HOST) -> tuple
     coded : bytes
         Without the zero behind it.
     accepted : tuple of type
-        Messages that are understood: :data:`TO_HOST` or :data:`TO_BASE`.
+        Messages that are understood: ``TO_HOST`` or ``TO_BASE`` of :mod:`.messages`.
 
     Returns
     -------
@@ -131,7 +131,7 @@ class Decoder:
     Parameters
     ----------
     accepted : tuple of type
-        :data:`TO_HOST` or :data:`TO_BASE`.
+        ``TO_HOST`` or ``TO_BASE`` of :mod:`.messages`.
 
     Attributes
     ----------
