@@ -8,9 +8,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.rosbag2 import Writer
+from websockets.sync.client import ClientConnection, connect
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "robot" / "base"))  # the simulated Mega
 
@@ -26,6 +28,7 @@ from contourslam.scan import LaserScan, Odometry
 from contourslam.simulation.hardware.plugged_x4 import PluggedX4
 
 Failure = Callable[..., str]
+COMMAND = [sys.executable, "-m", "contourslam"]
 
 
 @pytest.fixture
@@ -73,7 +76,7 @@ def test_ctrl_c_and_kill_stop_the_motors_and_keep_what_was_done(
 ) -> None:
     out, route = tmp_path / "out", tmp_path / "way.csv"
     route.write_text("0, 0\n5, 0\n")
-    words = [sys.executable, "-m", "contourslam", "drive", "-o", str(out), "--robot", str(robot), "--route", str(route)]
+    words = [*COMMAND, "drive", "-o", str(out), "--robot", str(robot), "--route", str(route)]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not any(drive.left > 0 for drive in mega.drives()):
@@ -104,6 +107,74 @@ def test_a_recording_that_cannot_be_completed_costs_nothing_of_the_run(
     assert run.stamps.size > 0 and any("No space left" in reason for reason in run.skipped)
 
 
+@pytest.mark.usefixtures("mega")
+def test_a_drive_can_be_watched_and_leaves_its_run_all_the_same(robot: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ["drive", "-o", str(out), "--robot", str(robot), "--seconds", "4", "--json", "--view", "--view-port", "0"]
+    with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            url = next(line for line in process.stderr if "http://" in line).split()[-1]
+            with connect(url.replace("http:", "ws:") + "ws", max_size=None) as page:
+                about, status = watched(page, lambda status: status["scans"] > 3)
+            assert about["title"] == "out" and about["live"]
+            assert {row["name"] for row in status["health"]} >= {"scans", "odometry", "latency", "lidar", "base"}
+            assert next(row for row in status["health"] if row["name"] == "lidar")["level"] == "ok"
+            said, _ = process.communicate(timeout=60)
+            assert process.returncode == 0
+        finally:
+            process.kill()
+    assert json.loads(said)["scans"] > 8  # the link is not among the result
+
+
+def test_a_robot_is_watched_without_being_driven(robot: Path, mega: MegaDevice) -> None:
+    words = [*COMMAND, "view", "--live", "--robot", str(robot), "--port", "0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            url = process.stdout.readline().strip()
+            with connect(url.replace("http:", "ws:") + "ws", max_size=None) as page:
+                about, status = watched(page, lambda status: status["scans"] > 3)
+                assert about["title"] == "robot" and status["state"] == "live"
+                process.send_signal(signal.SIGINT)
+                assert process.wait(30) == 0
+        finally:
+            process.kill()
+    assert not any(isinstance(message, Drive) for _, message in mega.commands)
+
+
+def test_a_lidar_that_is_not_there_is_told_on_the_page(tmp_path: Path) -> None:
+    missing = tmp_path / "robot.yaml"
+    save_robot(missing, RobotConfig(lidar=LidarPart(port=str(tmp_path / "nothing"))))
+    words = [*COMMAND, "view", "--live", "--robot", str(missing), "--ignore-odometry", "--port", "0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            url = process.stdout.readline().strip()
+            with connect(url.replace("http:", "ws:") + "ws", max_size=None) as page:
+                _, status = watched(page, lambda status: "nothing" in status["trouble"])
+                assert {row["name"]: row["level"] for row in status["health"]}["lidar"] == "error"
+                assert "base" not in [row["name"] for row in status["health"]]
+                process.send_signal(signal.SIGINT)
+                assert process.wait(30) == 1
+            assert "no turn of the lidar was completed" in process.stderr.read()
+        finally:
+            process.kill()
+
+
+def watched(page: ClientConnection, fits: Callable[[Any], object]) -> tuple[Any, Any]:
+    """Read until the status fits; give what the page was told at first, and that status."""
+    about = None
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until:
+        message = page.recv(timeout=60)
+        head = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+        if head["kind"] == "hello":
+            about = head["about"]
+        elif head["kind"] == "frame":
+            page.send(json.dumps({"do": "drawn", "value": head["index"]}))
+        elif head["kind"] == "status" and fits(head):
+            return about, head
+    raise AssertionError("no such status came")
+
+
 def test_what_cannot_go_together_is_told_before_anything_moves(tmp_path: Path, failure: Failure) -> None:
     out, route = tmp_path / "out", tmp_path / "way.csv"
     assert "choose one" in failure("drive", "-o", out, "--keys", "--route", route)
@@ -111,6 +182,8 @@ def test_what_cannot_go_together_is_told_before_anything_moves(tmp_path: Path, f
     assert "way.csv: cannot be read" in failure("drive", "-o", out, "--route", route)
     assert "robot.yaml: cannot be read" in failure("drive", "-o", out, "--robot", tmp_path / "robot.yaml")
     assert "need a terminal" in failure("drive", "-o", out, "--keys")
+    assert "that --view asks for" in failure("drive", "-o", out, "--view-port", "1")
+    assert "--view-port must lie" in failure("drive", "-o", out, "--view", "--view-port", "70000")
     assert not out.exists()
 
 

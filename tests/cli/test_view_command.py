@@ -55,6 +55,16 @@ def test_what_cannot_be_done_is_said_in_a_line(
     assert said in failure("view", log, *options)
 
 
+def test_a_recording_or_the_robot_is_wanted_and_not_both(log: Path, failure: Callable[..., str]) -> None:
+    assert "name a recording, or --live for the robot" in failure("view")
+    assert "a recording and --live do not go together" in failure("view", log, "--live")
+    assert "leave it out for a recording" in failure("view", log, "--robot", "robot.yaml")
+    said = failure("view", "--live", "--paused", "--detectors", "wu", "--scan-topic", "scan")
+    assert "--detectors and --paused and --scan-topic are for recordings" in said
+    assert "robot.yaml: cannot be read" in failure("view", "--live", "--robot", "robot.yaml")
+    assert "cannot be served at 203.0.113.7" in failure("view", "--live", "--host", "203.0.113.7", "--port", "0")
+
+
 def test_a_recording_without_scans_is_said_at_once(tmp_path: Path) -> None:
     empty = tmp_path / "empty.log"
     empty.write_text("ODOM 0 0 0 0 0 0 1.0 host 0.0\n")

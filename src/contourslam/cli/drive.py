@@ -13,6 +13,8 @@ from contourslam.cli.console import complain, make_way, note, prepare_folder, pr
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Patience, Settings
 from contourslam.cli.run import DEFAULTS
+from contourslam.cli.serving import Watched
+from contourslam.cli.watching import tell_trouble
 from contourslam.config import Config
 from contourslam.errors import ConfigError, RecordingError
 
@@ -34,7 +36,8 @@ class Drive:
     seconds. A route is YAML (waypoints: [[0, 0], [2, 0]], closed: true) or CSV (x, y), in m, from where the robot
     starts, x ahead; it is followed by the pose in the map, and the robot stops where its lidar falls silent.
 
-    The folder gets what `contourslam run` writes, and the recording. The motors are off whenever the command ends.
+    The folder gets what `contourslam run` writes, and the recording. The motors are off whenever the command ends. With
+    --view the drive is watched in a browser.
 
     Example: contourslam drive -o out/room --robot robot.yaml --keys
     """
@@ -56,6 +59,7 @@ class Drive:
     picture_rate: float = 2.0
     """Pictures a second, where there is a camera."""
     patience: Patience = 30.0
+    watched: Watched = field(default_factory=Watched)
     json: Json = False
     settings: Settings = field(default_factory=lambda: DEFAULTS)
 
@@ -69,6 +73,7 @@ class Drive:
         from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
 
         self._check()
+        page = self.watched.page
         config = RobotConfig() if self.robot is None else load_robot(self.robot)
         settings = settings_of(config, self.settings)
         with ExitStack() as stack:
@@ -78,17 +83,27 @@ class Drive:
             note("making ready; the robot must stand still until it drives")
             warm_up(settings)
             interrupt = stack.enter_context(Interrupt())
-            robot = stack.enter_context(Robot(openers(config, patience=self.patience, rate=self.picture_rate)))
+            robot = Robot(openers(config, patience=self.patience, rate=self.picture_rate))
+            witness = None if page is None else page.witness(stack, self.output.name, driven=True)(robot, settings)
+            stack.enter_context(robot)
             events = robot.wait_until_ready(interrupt.or_after(None))
-            autosave = self.output / "map.cmap"
-            live_map = LiveMap(settings, PATIENT, lidar_mount=config.lidar.mount, autosave=autosave)
+            live_map = LiveMap(
+                settings, PATIENT, lidar_mount=config.lidar.mount, autosave=self.output / "map.cmap",
+                onlooker=None if witness is None else witness.follow,
+            )  # fmt: skip
             stack.callback(live_map.close)
             camera = None if config.camera is None else (config.camera.model, config.camera.T_base_camera)
             writer = stack.enter_context(
                 RecordingWriter(self.output / "recording", lidar_mount=config.lidar.place, camera=camera)
             )
             status = _Status(robot, live_map)
-            journey = Journey(robot, live_map, writer, watch=status.show)
+
+            def watch(event: "Event") -> None:
+                status.show(event)
+                if witness is not None:
+                    witness.watch(event)
+
+            journey = Journey(robot, live_map, writer, watch=watch)
             for event in events:
                 journey.take(event)
             until = interrupt.or_after(self.seconds)
@@ -186,7 +201,7 @@ class _Status:
 
         if isinstance(event, Trouble):
             self.clear()
-            note(event.message or f"the {event.part} is there again")
+            tell_trouble(event)
         elif self._live and time.monotonic() - self._drawn > _REDRAW:
             self._drawn = time.monotonic()
             print(f"\r{self._line()}\x1b[K", end="", file=sys.stderr, flush=True)

@@ -1,5 +1,6 @@
 """``contourslam robot-in-the-loop``: the whole robot at real time, its devices simulated."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from contourslam.cli.console import Bar, complain, make_way, prepare_folder, pri
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
 from contourslam.cli.run import DEFAULTS
+from contourslam.cli.serving import Watched
 
 
 @dataclass(frozen=True)
@@ -15,7 +17,7 @@ class RobotInTheLoop:
 
     A room in MuJoCo feeds a simulated YDLidar X4 and a simulated Arduino Mega that runs the real firmware, each on a
     serial port; `make firmware` builds the two programs. The folder gets a page, the run, and the recording. The exit
-    code is 1 where the errors are larger than 3 cm and 0.01 rad.
+    code is 1 where the errors are larger than 3 cm and 0.01 rad. With --view the drive is watched in a browser.
 
     Example: contourslam robot-in-the-loop -o out/loop --fault damaged
     """
@@ -38,6 +40,7 @@ class RobotInTheLoop:
     """Also write the recording."""
     firmware: Path = Path("firmware/mega/build")
     """Folder that the firmware and the simulated board are built in."""
+    watched: Watched = field(default_factory=Watched)
     json: Json = False
     settings: Settings = field(default_factory=lambda: DEFAULTS)
 
@@ -50,14 +53,15 @@ class RobotInTheLoop:
         config = LoopConfig(
             self.seed, self.room, self.seconds, fault_named(self.fault), self.speed, self.pictures, self.settings
         )
+        page, built = self.watched.page, Firmware.built_in(self.firmware)
         prepare_folder(self.output, overwrite=self.overwrite)
         recording = self.output / "recording" if self.record else None
         if recording is not None:
             make_way(recording, overwrite=self.overwrite)
-        with Interrupt() as interrupt, Bar("driving") as bar:
+        with Interrupt() as interrupt, ExitStack() as stack, Bar("driving") as bar:
             result = robot_in_the_loop(
-                config, Firmware.built_in(self.firmware), recording=recording, progress=bar.to,
-                stopped=lambda: interrupt.requested,
+                config, built, recording=recording, progress=bar.to, stopped=lambda: interrupt.requested,
+                witness=None if page is None else page.witness(stack, f"robot in the {self.room}", driven=True),
             )  # fmt: skip
         written = write_loop_report(self.output, result, command=command)
         if self.json:

@@ -1,7 +1,6 @@
-"""``contourslam view``: a recording mapped before one's eyes, in a browser."""
+"""``contourslam view``: a recording mapped before one's eyes, in a browser, or a robot while it maps."""
 
 import time
-import webbrowser
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from contourslam.cli.console import complain, note
+from contourslam.cli.console import complain
 from contourslam.cli.interrupt import Interrupt
 from contourslam.cli.options import Flag, Settings
 from contourslam.cli.run import DEFAULTS
-from contourslam.errors import ConfigError, MissingExtraError, RecordingError
+from contourslam.cli.serving import Page, print_link
+from contourslam.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
     from contourslam.recordings import Message, Recording
@@ -24,29 +24,32 @@ _LOOK = 0.1  # s between two looks at Ctrl-C
 
 @dataclass(frozen=True)
 class View:
-    """Map a recording in a browser: map, scan, detector responses, loops and uncertainty, at any speed.
+    """Map a recording or a robot's surroundings in a browser: map, scan, detector responses, loops and uncertainty.
 
     The page is served on this machine alone, until Ctrl-C. With --host others can open it too, by a link with a secret
-    in it. It loads nothing from elsewhere. Pause, step and drag the time line back to any moment; click a corner to see
-    its history. With --detectors up to four detectors map the recording side by side.
+    in it. It loads nothing from elsewhere. A recording is mapped at any speed: pause, step and drag the time line back
+    to any moment; click a corner to see its history. With --detectors up to four detectors map it side by side.
+
+    With --live the robot's lidar and base are brought up instead, and what they see is mapped while somebody pushes the
+    robot or carries the lidar (--ignore-odometry). Nothing drives and nothing is kept: `contourslam drive --view` does
+    both, and with neither --route nor --keys it only keeps.
 
     Example: contourslam view intel.log.xz --speed 10 --detectors matched_filter,wu
     """
 
-    recording: tyro.conf.Positional[Path]
+    recording: tyro.conf.Positional[Path | None] = None
     """Recording to map: a file, or the folder of a rosbag2."""
+    live: Flag = False
+    """Map what the robot sees now, instead of a recording."""
+    robot: Path | None = None
+    """With --live, how the robot is built: a robot.yaml; the defaults where left out, ports found by themselves."""
     detectors: Annotated[str, tyro.conf.arg(metavar="A,B,...")] = ""
     """Detectors side by side, up to four, by commas; --detector alone where left out."""
     speed: float = 1.0
     """Seconds of the recording per second; inf for as fast as possible. The page can change it."""
     paused: Flag = False
     """Wait until somebody presses play."""
-    host: str = "127.0.0.1"
-    """Address to serve the page at; 0.0.0.0 for the whole network."""
-    port: int = 8642
-    """Port to serve the page at; 0 for any that is free."""
-    browser: Flag = False
-    """Open the page in this machine's browser."""
+    page: Page = field(default_factory=Page)
     scan_topic: str | None = None
     """Topic of the scans; found by itself where there is only one."""
     odometry_topic: str | None = None
@@ -59,26 +62,41 @@ class View:
 
     def execute(self, command: str) -> int:
         """Serve the page until Ctrl-C."""
-        from contourslam.recordings import open_recording
+        self._check()
+        if self.live:
+            from contourslam.cli.watching import watch_robot
 
+            return watch_robot(self.robot, self.settings, self.page, with_base=not self.ignore_odometry)
+        assert self.recording is not None
+        return self._replay(self.recording)
+
+    def _check(self) -> None:
+        if (self.recording is None) is not self.live:
+            wrong = "a recording and --live do not go together" if self.live else "there is nothing to map"
+            raise ConfigError(f"{wrong}; name a recording, or --live for the robot")
+        if self.robot is not None and not self.live:
+            raise ConfigError("--robot says how the robot of --live is built; leave it out for a recording")
+        topics = {
+            "--scan-topic": self.scan_topic,
+            "--odometry-topic": self.odometry_topic,
+            "--truth-topic": self.truth_topic,
+        }
+        of_recordings = {
+            "--detectors": self.detectors, "--paused": self.paused, "--speed": self.speed != 1.0, **topics
+        }  # fmt: skip
+        if self.live and (given := [name for name, value in of_recordings.items() if value]):
+            raise ConfigError(f"{' and '.join(given)} are for recordings; leave them out with --live")
         if not self.speed > 0.0:
             raise ConfigError(f"--speed must be above 0, got {self.speed}")
-        if not 0 <= self.port < 65536:
-            raise ConfigError(f"--port must lie between 0 and 65535, got {self.port}")
-        try:
-            from contourslam.view.access import is_loopback, new_token
-            from contourslam.view.pace import Pace
-            from contourslam.view.replayed import Replayed
-            from contourslam.view.server import ViewServer
-        except ModuleNotFoundError as error:
-            if error.name is None or error.name.partition(".")[0] != "websockets":
-                raise
-            raise MissingExtraError(
-                "websockets serves the page and is not installed: pip install 'contourslam[view]'"
-            ) from error
+        self.page.check()
+
+    def _replay(self, path: Path) -> int:
+        from contourslam.recordings import open_recording
+        from contourslam.view.pace import Pace
+        from contourslam.view.replayed import Replayed
 
         recording = open_recording(
-            self.recording,
+            path,
             scan_topic=self.scan_topic,
             odometry_topic=self.odometry_topic,
             truth_topic=self.truth_topic,
@@ -88,19 +106,16 @@ class View:
             self._messages(recording),
             self.settings,
             [name.strip() for name in self.detectors.split(",") if name.strip()],
-            title=self.recording.name,
+            title=path.name,
             duration=recording.duration,
             lidar_mount=recording.lidar_mount,
             pace=pace,
         )
-        token = "" if is_loopback(self.host) else new_token()
-        server = ViewServer(replayed.show, host=self.host, port=self.port, token=token, lag=replayed.lag)
         player = replayed.player
-        with Interrupt() as interrupt, server:
-            print(server.url, flush=True)
-            note("open this page in a browser; Ctrl-C ends it" + (", others need the whole link" if token else ""))
-            if self.browser:
-                webbrowser.open(server.url)
+        with (
+            Interrupt() as interrupt,
+            self.page.served(replayed.show, replayed.lag, print_link),
+        ):
             player.start()
             while not interrupt.requested and player.is_alive():
                 player.join(_LOOK)

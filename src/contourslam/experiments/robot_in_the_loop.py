@@ -32,6 +32,7 @@ from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
 from contourslam.robot.live_map import PATIENT, LiveMap, settings_of
 from contourslam.robot.pilot import Pilot, PilotConfig
 from contourslam.robot.route import sample_route
+from contourslam.robot.witness import MakeWitness
 from contourslam.simulation.config import YDLIDAR_X4, CameraModel, RobotModel
 from contourslam.simulation.hardware.board import SimulatedBoard
 from contourslam.simulation.hardware.line import Damage
@@ -57,6 +58,7 @@ def robot_in_the_loop(
     recording: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
     stopped: Callable[[], bool] = lambda: False,
+    witness: MakeWitness | None = None,
 ) -> LoopResult:
     """Let the robot drive: real drivers, real firmware, real mapping; the world and the wires are simulated.
 
@@ -70,6 +72,8 @@ def robot_in_the_loop(
         Called with the share done.
     stopped : callable
         Ends the drive early.
+    witness : callable, optional
+        Makes who watches the robot.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def robot_in_the_loop(
         opened = openers(parts)
         if camera is not None:
             opened = replace(opened, camera=lambda: camera)
-        return _drive(config, settings, parts, opened, world, recording, progress, stopped, stack)
+        return _drive(config, settings, parts, opened, world, recording, progress, stopped, stack, witness)
 
 
 def robot_config(config: LoopConfig, lidar: Path, base: Path) -> RobotConfig:
@@ -140,14 +144,22 @@ def _drive(
     progress: Callable[[float], None],
     stopped: Callable[[], bool],
     stack: ExitStack,
+    witness: MakeWitness | None = None,
 ) -> LoopResult:
     pictures: list[Picture] = []
+    robot = Robot(opened)
+    watched = None if witness is None else witness(robot, settings)
 
     def watch(event: Event) -> None:
         if isinstance(event, Picture):
             pictures.append(event)
+        if watched is not None:
+            watched.watch(event)
 
-    live_map = LiveMap(settings, PATIENT, lidar_mount=parts.lidar.mount, initial_pose=np.array(world.start))
+    live_map = LiveMap(
+        settings, PATIENT, lidar_mount=parts.lidar.mount, initial_pose=np.array(world.start),
+        onlooker=None if watched is None else watched.follow,
+    )  # fmt: skip
     stack.callback(live_map.close)
     pilot = Pilot(
         sample_route(ROOMS[config.room].route), closed=True, config=PilotConfig(speed=config.speed, blind_time=4.0)
@@ -157,7 +169,7 @@ def _drive(
         camera = parts.camera
         seen = None if camera is None else (camera.model, camera.T_base_camera)
         writer = stack.enter_context(RecordingWriter(recording, lidar_mount=parts.lidar.place, camera=seen))
-    robot = stack.enter_context(Robot(opened))
+    stack.enter_context(robot)
     journey = Journey(robot, live_map, writer, watch=watch)
     for event in robot.wait_until_ready(stopped):
         journey.take(event)

@@ -1,0 +1,139 @@
+"""How commands serve the page: its options, and what is said of it."""
+
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from contourslam.cli.console import note
+from contourslam.cli.options import Flag
+from contourslam.errors import ConfigError, MissingExtraError
+
+if TYPE_CHECKING:
+    from contourslam.config import Config
+    from contourslam.robot.bring_up import Robot
+    from contourslam.robot.witness import MakeWitness, Witness
+    from contourslam.view.lag import Lag
+    from contourslam.view.show import Show
+
+HOST, PORT = "127.0.0.1", 8642
+Host = Annotated[str, tyro.conf.arg(help="Address to serve the page at; 0.0.0.0 for the whole network.")]
+PagePort = Annotated[int, tyro.conf.arg(help="Port to serve the page at; 0 for any that is free.")]
+
+Say = Callable[[str], None]
+
+
+def print_link(url: str) -> None:
+    """Print the link, and nothing else, on standard output, where scripts find it."""
+    print(url, flush=True)
+
+
+@dataclass(frozen=True)
+class Page:
+    """Where the page is served."""
+
+    host: Host = HOST
+    port: PagePort = PORT
+    browser: Flag = False
+    """Open the page in this machine's browser."""
+
+    def check(self, prefix: str = "") -> None:
+        """Refuse what cannot be served.
+
+        Raises
+        ------
+        ContourslamError
+            If the port is none, or the library that serves the page is not installed.
+        """
+        if not 0 <= self.port < 65536:
+            raise ConfigError(f"--{prefix}port must lie between 0 and 65535, got {self.port}")
+        try:
+            import websockets  # noqa: F401, whether it is there
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(
+                "websockets serves the page and is not installed: pip install 'contourslam[view]'"
+            ) from error
+
+    @contextmanager
+    def served(self, show: "Show", lag: "Lag", say: Say = note) -> Iterator[None]:
+        """Serve the page inside the context.
+
+        Parameters
+        ----------
+        show : Show
+        lag : Lag
+        say : callable
+            Called with the link.
+
+        Raises
+        ------
+        ContourslamError
+            If it cannot be served there.
+        """
+        from contourslam.view.access import is_loopback, new_token
+        from contourslam.view.server import ViewServer
+
+        token = "" if is_loopback(self.host) else new_token()
+        with ViewServer(show, host=self.host, port=self.port, token=token, lag=lag) as server:
+            say(server.url)
+            note("open this page in a browser; Ctrl-C ends it" + (", others need the whole link" if token else ""))
+            if self.browser:
+                webbrowser.open(server.url)
+            yield
+
+    def witness(self, stack: ExitStack, title: str, *, driven: bool, say: Say = note) -> "MakeWitness":
+        """Give what has a robot watched by the page.
+
+        Parameters
+        ----------
+        stack : ExitStack
+            Ends the server.
+        title : str
+            What the page calls the robot.
+        driven : bool
+            Commands go to the base all the time.
+        say : callable
+            Called with the link.
+        """
+
+        def make(robot: "Robot", settings: "Config") -> "Witness":
+            from contourslam.robot.health import RobotHealth
+            from contourslam.robot.witness import Witness
+            from contourslam.view.followed import Followed
+
+            health = RobotHealth(robot, driven=driven)
+            followed = Followed(settings, title=title, health=health)
+            stack.enter_context(self.served(followed.show, followed.lag, say))
+            return Witness(health.watch, followed.follow)
+
+        return make
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Whether the work is watched, and where the page is served then."""
+
+    view: Flag = False
+    """Serve the live page meanwhile (docs/view.md)."""
+    view_host: Host = HOST
+    view_port: PagePort = PORT
+
+    @property
+    def page(self) -> Page | None:
+        """Where it is served; None for nowhere.
+
+        Raises
+        ------
+        ContourslamError
+            As :meth:`Page.check`; also if it says where and not that.
+        """
+        if not self.view:
+            if (self.view_host, self.view_port) != (HOST, PORT):
+                raise ConfigError("--view-host and --view-port say where the page is served that --view asks for")
+            return None
+        page = Page(self.view_host, self.view_port)
+        page.check("view-")
+        return page
