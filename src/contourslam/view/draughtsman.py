@@ -8,7 +8,9 @@ from contourslam.view.memory import Memory
 from contourslam.view.wire import pack
 
 PAUSE = 0.25  # s between two maps of one lane, at least
-REST, REST_LOOP, REST_IDLE = 40.0, 5.0, 3.0  # times as long as it takes to draw a map, no other of the lane is drawn
+# So many times as long as it takes to draw a map, no other of the lane is drawn; the last is for a mapping that is
+# to be as fast as it can.
+REST, REST_LOOP, REST_IDLE, REST_PRESSED = 40.0, 5.0, 3.0, 80.0
 
 
 class Draughtsman:
@@ -32,7 +34,7 @@ class Draughtsman:
         self._urgent[lane] |= urgent
         self._wanted[lane] |= urgent or wanted
 
-    def work(self, elapsed: float, *, idle: bool) -> bool:
+    def work(self, elapsed: float, *, idle: bool, pressed: bool = False) -> bool:
         """Draw one map where one is due; True where one was.
 
         Parameters
@@ -41,16 +43,22 @@ class Draughtsman:
             Time of the last scan, s.
         idle : bool
             No scan waits.
+        pressed : bool
+            The mapping has no time to spare.
         """
         now = self._clock()
         for number in range(len(self._lanes)):
             if not (self._wanted[number] and self._lanes[number].at_rest):
                 continue
-            rest = REST_LOOP if self._urgent[number] else REST_IDLE if idle else REST
-            if now >= self._ended[number] + max(PAUSE, rest * self._took[number]):
+            if now >= self._ended[number] + max(PAUSE, self._rest(number, idle, pressed) * self._took[number]):
                 self.draw(number, elapsed)
                 return True
         return False
+
+    def _rest(self, number: int, idle: bool, pressed: bool) -> float:
+        if pressed:
+            return REST_PRESSED
+        return REST_LOOP if self._urgent[number] else REST_IDLE if idle else REST
 
     def draw(self, number: int, elapsed: float) -> None:
         """Draw a lane's map now."""

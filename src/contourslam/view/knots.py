@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
-from contourslam.geometry.poses import between_one, transform
+from contourslam.slam.result import ScanUpdate
 from contourslam.view.moment import Moment
 
 WAY, TURN = 0.25, math.radians(12.0)  # m and rad between two
 INK = 220  # contour points kept of each, at most
 UNIT = 0.002  # m; a point is kept as two integers of 16 bits, up to 65 m away
+FARTHEST = 32767.0  # units
 LANE_COLUMNS = 6  # x, y, heading; standard deviation, m; NIS by degrees of freedom; quality
+UNKNOWN = (math.nan,) * 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,33 +50,38 @@ class Knotter:
     """
 
     def __init__(self, mount: Floats) -> None:
-        self._mount = mount
-        self._last: Floats | None = None
-        self._nis = self._dof = 0.0
+        x, y, a = mount.tolist()
+        c, s = math.cos(a), math.sin(a)
+        self._turn = np.array([[c, s], [-s, c]], dtype=np.float32) / np.float32(UNIT)  # rows on the left of it
+        self._shift = np.array([x, y], dtype=np.float32) / np.float32(UNIT)
+        self._last: list[float] | None = None
         self.spacing = 1.0
 
     def take(self, moment: Moment) -> Knot | None:
         """Give the knot that a scan makes, or None where it is too near to the one before."""
-        pose = moment.lanes[0].update.pose
+        pose = moment.lanes[0].update.pose.tolist()
         if self._last is not None:
-            step = between_one(self._last, pose)
-            if math.hypot(step[0], step[1]) < WAY * self.spacing and abs(step[2]) < TURN * self.spacing:
-                return None
-        self._last = np.array(pose)
+            x, y, heading = self._last
+            if math.hypot(pose[0] - x, pose[1] - y) < WAY * self.spacing:
+                turned = abs(math.remainder(pose[2] - heading, math.tau))
+                if turned < TURN * self.spacing:
+                    return None
+        self._last = pose
         return self._knot(moment)
 
     def _knot(self, moment: Moment) -> Knot:
-        truth = np.full(3, np.nan) if moment.truth is None else moment.truth
-        row = np.concatenate([[moment.elapsed], moment.odometry, truth]).astype(np.float32)
-        lanes = np.empty((len(moment.lanes), LANE_COLUMNS), np.float32)
-        for values, lane in zip(lanes, moment.lanes, strict=True):
-            u = lane.update
-            sigma = math.sqrt(max(u.covariance[0, 0] + u.covariance[1, 1], 0.0))
-            values[:] = *u.pose, sigma, u.nis / u.nis_dof if u.nis_dof else np.nan, np.nan
-            if u.quality is not None:
-                values[5] = u.quality
+        truth = UNKNOWN if moment.truth is None else moment.truth.tolist()
+        row = np.array([moment.elapsed, *moment.odometry.tolist(), *truth], dtype=np.float32)
+        lanes = np.array([_columns(lane.update) for lane in moment.lanes], dtype=np.float32)
         points = moment.trace.points
-        some = points[:: -(-len(points) // INK) or 1].astype(np.float64)
-        ink = transform(self._mount, some) / UNIT
-        ink = ink[(np.abs(ink) < 32767.0).all(axis=1)]
+        ink = points[:: -(-len(points) // INK) or 1] @ self._turn + self._shift
+        if len(ink) and not -FARTHEST < ink.min() <= ink.max() < FARTHEST:
+            ink = ink[(np.abs(ink) < FARTHEST).all(axis=1)]
         return Knot(moment.index, row, lanes, np.rint(ink).astype(np.int16))
+
+
+def _columns(update: ScanUpdate) -> list[float]:
+    """One lane's numbers."""
+    sigma = math.sqrt(max(update.covariance[0, 0] + update.covariance[1, 1], 0.0))
+    nis = update.nis / update.nis_dof if update.nis_dof else math.nan
+    return [*update.pose.tolist(), sigma, nis, math.nan if update.quality is None else update.quality]

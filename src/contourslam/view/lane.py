@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from contourslam.graph import GraphSlam
 
 RECENT = 0.03  # weight of the last scan in the time per stage
-
+TOGETHER = 8  # scans after which it is reckoned anew
 
 METHODS = ("nearby", "search", "constellation")
 """How loops are found, in the order in which the page numbers them."""
@@ -69,8 +69,10 @@ class Lane:
         self._stamps = array("d")  # of all scans: eight bytes each, for a drive may take hours
         self._ties: list[tuple[int, int, int]] = []  # of each loop, numbers of its two scans and of its method
         self._sighting: Sighting | None = None
+        self._seconds: dict[str, float] = {}  # of the scans since the stages were last reckoned
         self._milliseconds: dict[str, float] = {}
-        self._first_odometry: Floats | None = None
+        self._stages: tuple[tuple[str, float], ...] = ()
+        self._odometry_start: Floats | None = None  # where its origin lies
 
     def take(
         self, update: ScanUpdate, seconds: Mapping[str, float], elapsed: float, *, localized: bool = True
@@ -91,15 +93,15 @@ class Lane:
         self._stamps.append(update.stamp)
         self._count_time(seconds)
         self.last_pose = update.pose
-        if self._graph is not None:
-            self._count_loops(self._graph.loops(len(self.loops)))
         look = self.look
         if look is not None and look.stamp == update.stamp:
             self._sighting = sighting_of(look, update.pose, self.mount)
             self.stories.take(elapsed, update, self._sighting)
+            if self._graph is not None:  # it closes loops where it looks for landmarks
+                self._count_loops(self._graph.loops(len(self.loops)))
         else:
             self.stories.take(elapsed, update, None)
-        return LaneMoment(update, self._sighting, tuple(self._milliseconds.items()), localized)
+        return LaneMoment(update, self._sighting, self._stages, localized)
 
     @property
     def at_rest(self) -> bool:
@@ -117,18 +119,25 @@ class Lane:
 
     def odometry(self) -> Floats:
         """Raw odometry at the last scan, moved so that it starts where the estimate starts, shape (3,)."""
-        if self._first_odometry is None:
-            self._first_odometry = np.array(self.mapper.odometry_pose)
-        return compose_one(
-            self.mapper.start_pose, between_one(self._first_odometry, np.array(self.mapper.odometry_pose))
-        )
+        pose = self.mapper.odometry_pose
+        if self._odometry_start is None:
+            self._odometry_start = compose_one(self.mapper.start_pose, between_one(np.array(pose), np.zeros(3)))
+        return compose_one(self._odometry_start, pose)
 
     def _count_time(self, seconds: Mapping[str, float]) -> None:
-        weight = max(RECENT, 1.0 / len(self._stamps))
-        known = self._milliseconds
-        for stage in dict.fromkeys((*known, *seconds)):  # in the order in which they were first met
+        total = self._seconds
+        for stage, spent in seconds.items():
+            total[stage] = total.get(stage, 0.0) + spent
+        scans = len(self._stamps)
+        if scans % TOGETHER and scans > TOGETHER:
+            return
+        count = TOGETHER if scans > TOGETHER else 1
+        weight, known = max(RECENT, 1.0 / scans) * count, self._milliseconds
+        for stage in total:  # in the order in which they were first met
             before = known.get(stage, 0.0)
-            known[stage] = before + weight * (1e3 * seconds.get(stage, 0.0) - before)
+            known[stage] = before + weight * (1e3 * total[stage] / count - before)
+            total[stage] = 0.0
+        self._stages = tuple(known.items())
 
     def _count_loops(self, loops: tuple[Loop, ...]) -> None:
         """Note which scans each loop ties; one to a place of an earlier drive has an end that is on no way here."""

@@ -1,12 +1,13 @@
 """What is kept of each scan so that it can be drawn at any later time, as it was known then."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.contour.contours import Contours, Floats
-from contourslam.geometry.poses import compose_one, transform
+from contourslam.geometry.poses import compose_one
 from contourslam.slam.look import Look
 from contourslam.slam.result import ScanUpdate
 
@@ -68,12 +69,15 @@ class Sighting:
 def sighting_of(look: Look, pose: Floats, mount: Floats) -> Sighting:
     """Keep what a look gave; `pose` is that of the base at its scan."""
     seen = look.detection
-    points = np.concatenate([seen.corners.positions, seen.walls.end_points.mean(axis=1)])
+    ends = seen.walls.end_points
+    points = np.concatenate([seen.corners.positions, 0.5 * (ends[:, 0] + ends[:, 1])])
+    x, y, heading = compose_one(pose, mount).tolist()
+    c, s = math.cos(heading), math.sin(heading)
     return Sighting(
         look.stamp,
         len(seen.corners),
         look.ids.astype(np.int32),
-        transform(compose_one(pose, mount), points).astype(np.float32),
+        (points @ np.array([[c, s], [-s, c]]) + (x, y)).astype(np.float32),
         look.innovations.astype(np.float32),
     )
 

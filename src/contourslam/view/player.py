@@ -107,7 +107,7 @@ class Player(threading.Thread):
         self._waiting.clear()
         done = tuple(lane.push_scan(scan, elapsed) for lane in self.lanes)
         self.keeper.keep(scan, elapsed, done, self._truth_at(scan.stamp))
-        self.keeper.draughtsman.work(elapsed, idle=False)
+        self.keeper.draughtsman.work(elapsed, idle=False, pressed=self._pace.pressed)
         return True
 
     def _begin(self, scan: LaserScan) -> None:
