@@ -137,3 +137,68 @@ class LiveRobot:
 def live(drive) -> Callable[..., LiveRobot]:
     """Robots on the drive."""
     return lambda scans=40, **more: LiveRobot(drive(scans), **more)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One for all tests: to start it takes longer than any of them."""
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
+    with api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a page; whatever it asks for elsewhere, or complains of, fails the test."""
+    contexts, wrong = [], []
+
+    def open_page(server: ViewServer, *, width: int = 1280, **more):
+        context = browser.new_context(viewport={"width": width, "height": 800}, **more)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: wrong.append(message.text) if message.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: None if request.url.startswith(server.url) else wrong.append(request.url))
+        page.goto(server.url)
+        return page
+
+    open_page.wrong = wrong
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert wrong == []
+
+
+@pytest.fixture(scope="session", name="wait")
+def _wait():
+    """Wait for an expression to hold in a page."""
+    return wait
+
+
+def wait(page, true: str, seconds: float = 60.0) -> None:
+    """Wait for an expression to hold; the page's own policy lets none be evaluated inside it by playwright's way."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(f"Boolean({true})"):
+        assert time.monotonic() < end, f"never: {true}"
+        page.wait_for_timeout(30)
+
+
+@pytest.fixture(scope="session", name="inked")
+def _inked():
+    """Count the colours of a map."""
+    return inked
+
+
+def inked(page, lane: int = 0) -> int:
+    """How many colours the middle of a map has: an empty one has one."""
+    return page.evaluate(
+        "lane => { const c = contourslam.maps[lane].canvas, d = c.getContext('2d')"
+        ".getImageData(c.width / 4, c.height / 4, c.width / 2, c.height / 2).data;"
+        "return new Set(new Uint32Array(d.buffer)).size; }",
+        lane,
+    )

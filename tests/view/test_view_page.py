@@ -1,72 +1,15 @@
 """The page in a real browser: skipped where Chromium or playwright is not there."""
 
 import math
-import shutil
 import time
-
-import pytest
 
 from contourslam.view.pace import Pace
 from contourslam.view.server import ViewServer
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 STATE = "contourslam.model.status?.state"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    """One for all tests of this file: to start it takes longer than any of them."""
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
-    with api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
-        yield found
-        found.close()
-
-
-@pytest.fixture
-def opened(browser):
-    """Open a page; whatever it asks for elsewhere, or complains of, fails the test."""
-    contexts, wrong = [], []
-
-    def open_page(server: ViewServer, *, width: int = 1280, **more):
-        context = browser.new_context(viewport={"width": width, "height": 800}, **more)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: wrong.append(message.text) if message.type in ("error", "warning") else None)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda request: None if request.url.startswith(server.url) else wrong.append(request.url))
-        page.goto(server.url)
-        return page
-
-    open_page.wrong = wrong
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert wrong == []
-
-
-def wait(page, true: str, seconds: float = 60.0) -> None:
-    """Wait for an expression to hold; the page's own policy lets none be evaluated inside it by playwright's way."""
-    end = time.monotonic() + seconds
-    while not page.evaluate(f"Boolean({true})"):
-        assert time.monotonic() < end, f"never: {true}"
-        page.wait_for_timeout(30)
-
-
-def inked(page, lane: int = 0) -> int:
-    """How many colours the middle of a map has: an empty one has one."""
-    return page.evaluate(
-        "lane => { const c = contourslam.maps[lane].canvas, d = c.getContext('2d')"
-        ".getImageData(c.width / 4, c.height / 4, c.width / 2, c.height / 2).data;"
-        "return new Set(new Uint32Array(d.buffer)).size; }",
-        lane,
-    )
-
-
-def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened) -> None:
+def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened, wait, inked) -> None:
     _, server = served(40)
     page = opened(server)
     wait(page, f"{STATE} === 'finished' && contourslam.drawn === 39 && contourslam.model.maps[0]")
@@ -97,7 +40,7 @@ def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened) -
     )
 
 
-def test_four_detectors_stand_side_by_side(served, opened) -> None:
+def test_four_detectors_stand_side_by_side(served, opened, wait, inked) -> None:
     names = ("matched_filter", "wu", "teh_chin", "curvature_scale_space")
     _, server = served(20, names)
     page = opened(server)
@@ -117,7 +60,7 @@ def test_four_detectors_stand_side_by_side(served, opened) -> None:
     assert page.locator("figcaption b").all_inner_texts() == [name.replace("_", " ") for name in names[::-1]]
 
 
-def test_the_time_line_goes_back_at_once_and_play_goes_on_from_there(served, opened) -> None:
+def test_the_time_line_goes_back_at_once_and_play_goes_on_from_there(served, opened, wait) -> None:
     one, server = served(60, pace=Pace(math.inf))
     page = opened(server)
     wait(page, f"{STATE} === 'finished' && contourslam.model.frame?.index === 59")
@@ -138,7 +81,7 @@ def test_the_time_line_goes_back_at_once_and_play_goes_on_from_there(served, ope
     assert one.pace.speed == 50.0
 
 
-def test_a_dropped_connection_is_opened_again_and_everything_catches_up(replayed, opened, until) -> None:
+def test_a_dropped_connection_is_opened_again_and_everything_catches_up(replayed, opened, until, wait) -> None:
     one = replayed(60, pace=Pace(4.0))
     one.player.start()
     with ViewServer(one.show, lag=one.lag) as server:
@@ -159,7 +102,7 @@ def test_a_dropped_connection_is_opened_again_and_everything_catches_up(replayed
     opened.wrong.clear()
 
 
-def test_on_a_phone_nothing_sticks_out_and_fingers_move_the_map(served, opened) -> None:
+def test_on_a_phone_nothing_sticks_out_and_fingers_move_the_map(served, opened, wait) -> None:
     _, server = served(20)
     page = opened(server, width=360, has_touch=True, color_scheme="dark")
     wait(page, f"{STATE} === 'finished' && contourslam.model.frame?.index === 19")
@@ -187,7 +130,7 @@ def pinch(page) -> None:
         client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
-def test_every_control_has_a_name_and_can_be_reached_by_keys(served, opened) -> None:
+def test_every_control_has_a_name_and_can_be_reached_by_keys(served, opened, wait) -> None:
     _, server = served(10)
     page = opened(server)
     wait(page, f"{STATE} === 'finished'")

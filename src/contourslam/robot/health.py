@@ -61,6 +61,7 @@ class RobotHealth:
 
     def _lidar(self) -> Diagnostic:
         lidar, values = self._robot.lidar, {"turns": str(self._counts.get("lidar", 0))}
+        message = "it turns" if "lidar" in self._heard else "starting"
         if isinstance(lidar, YdlidarX4):
             parser = lidar.turns.parser
             values |= {
@@ -68,10 +69,11 @@ class RobotHealth:
                 "damaged packets": str(parser.bad),
                 "opened anew": str(lidar.reconnections),
             }
+            message += f", {parser.bad / max(parser.good + parser.bad, 1):.1%} of its packets damaged"
         if (silent := self._silent("lidar")) > TURNS:
             message = f"no turn of the lidar for {silent:.1f} s; check its plug, its cable and its power"
             return Diagnostic(Level.WARN, "lidar", message, values)
-        return Diagnostic(Level.OK, "lidar", "it turns" if "lidar" in self._heard else "starting", values)
+        return Diagnostic(Level.OK, "lidar", message, values)
 
     def _of_base(self) -> Diagnostic:
         base, state = self._robot.base, self._base.state

@@ -10,7 +10,6 @@ from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.detectors import make_detector
 from contourslam.live.diagnostics import Diagnostic
-from contourslam.live.figures import Rate
 from contourslam.live.processed import Processed
 from contourslam.live.session import Session
 from contourslam.localization.follow import Localizer
@@ -24,7 +23,6 @@ from contourslam.view.painter import Painter
 from contourslam.view.show import Show
 
 MOMENTS, MAPS = 64 << 20, 24 << 20  # bytes: a robot's computer has other uses for its memory
-WINDOW = 3.0  # s over which scans are counted
 
 
 class Followed:
@@ -70,13 +68,12 @@ class Followed:
         self.lag = Lag()
         self.error: Exception | None = None
         self._memory = memory or Memory(1, moments=MOMENTS, maps=MAPS)
-        self._rate = Rate(WINDOW)
         self._health = Health(self._diagnose, self._tell, clock)
         self._session: Session | None = None
         self._mount: Floats = np.array(config.lidar.mount)
         self._lane: Lane | None = None
         self._keeper: Keeper | None = None
-        self._scans, self._began, self._latency = 0, clock(), 0.0
+        self._scans, self._began = 0, clock()
         self._about: dict[str, Any] = {
             "title": title,
             "lanes": (config.detector,),
@@ -134,8 +131,7 @@ class Followed:
         if self._lane is None or self._lane.mapper is not mapper:
             self._begin(mapper)
         assert self._lane is not None and self._keeper is not None
-        self._rate.count(processed.stamp, self._clock())
-        self._latency, self._scans = processed.latency, self._scans + 1
+        self._scans += 1
         elapsed = self._elapsed()
         done = self._lane.take(processed.update, processed.seconds, elapsed, localized=processed.localized)
         self._keeper.keep(processed.scan, elapsed, (done,))
@@ -152,7 +148,7 @@ class Followed:
                 text = "another map is begun"
             self._memory.add_event(self._elapsed(), "begun", text)
         self._lane = Lane(mapper, self._config, self._mount)
-        self._keeper = Keeper((self._lane,), self._memory)
+        self._keeper = Keeper((self._lane,), self._memory, self._clock)
 
     def _elapsed(self) -> float:
         """Time since all began, s, on a clock that nobody sets."""
@@ -183,8 +179,6 @@ class Followed:
             "hurries_to": None,
             "head": 0.0 if newest is None else self._elapsed(),
             "scans": self._scans,
-            "scan_rate": self._rate.by_arrival(self._clock()),
-            "latency": 1e3 * self._latency,
             "beams": 0 if keeper is None else keeper.beams,
             "returned": 0 if keeper is None else keeper.returned,
             "health": rows,

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from contourslam.contour.contours import Contours, Floats
 from contourslam.landmarks import trace
@@ -23,6 +23,8 @@ class Keeper:
     ----------
     lanes : sequence of Lane
     memory : Memory
+    clock : callable
+        By which the draughtsman rests.
 
     Attributes
     ----------
@@ -31,10 +33,10 @@ class Keeper:
         Of the last scan.
     """
 
-    def __init__(self, lanes: Sequence[Lane], memory: Memory) -> None:
+    def __init__(self, lanes: Sequence[Lane], memory: Memory, clock: Callable[[], float] = time.monotonic) -> None:
         self._lanes, self._memory = lanes, memory
         self._knotter = Knotter(lanes[0].mount)
-        self.draughtsman = Draughtsman(lanes, memory)
+        self.draughtsman = Draughtsman(lanes, memory, clock)
         self._told = [0] * len(lanes)  # loops
         self._scans = 0
         self.beams = self.returned = 0

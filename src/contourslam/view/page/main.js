@@ -42,8 +42,14 @@ const transport = new Transport(model, send);
 /** The connection is new: all that was known is sent again. */
 function hello() {
   const { about } = model;
-  $("title").textContent = `${about.title} · ${about.back_end === "graph" ? "graph" : "EKF"}`;
+  $("title").textContent = `${about.title} · ${about.back_end === "ekf" ? "EKF" : about.back_end}`;
   document.title = `${about.title} – contourslam`;
+  $("waiting").hidden = false;
+  if (about.live) {
+    $("waiting").textContent = "Nothing has been mapped yet; Health says what is missing.";
+    $("posecard").before($("healthcard"));
+  }
+  transport.begin(about.live);
   const same = maps.map((map) => map.name).join() === about.lanes.join();
   if (!same) {
     selected = null;
@@ -78,7 +84,7 @@ function draw(now) {
     model.newEvents = [];
   }
   if (!model.about || !model.frame) return;
-  $("waiting").hidden = true;
+  waiting();
   if (camera.mode === "follow") [camera.x, camera.y] = model.frame.lanes[0].pose;
   if (camera.mode === "fit") camera.fit(maps[0].box(model), maps[0].canvas.clientWidth, maps[0].canvas.clientHeight);
   let moving = false;
@@ -97,6 +103,13 @@ function draw(now) {
     undrawn = null;
   }
   if (moving) ask();
+}
+
+/** What stands over the map where it cannot say more: that the robot has not been found in it. */
+function waiting() {
+  const lost = model.frame.lanes.some((lane) => !lane.localized);
+  $("waiting").hidden = !lost;
+  if (lost) $("waiting").textContent = "The robot is not found in the map yet: drive it to where it sees walls and corners.";
 }
 
 function legend() {

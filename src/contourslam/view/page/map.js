@@ -129,14 +129,14 @@ export class LaneMap {
     if (layers.path) drawPath(this, model, frame);
     if (layers.truth) drawLine(this, model.track(4), colour("truth"), 1.4, [5, 6]);
     if (map && layers.walls) drawWalls(this, map, frame);
-    if (layers.pairs && map) drawPairs(this, frame, map);
-    if (layers.scan) drawScan(this, model, frame, layers.response);
+    if (layers.pairs && map && frame.localized) drawPairs(this, frame, map);
+    if (layers.scan && frame.localized) drawScan(this, model, frame, layers.response);
     this.lift = map && layers.corners ? drawCorners(this, map, frame, layers.ids, selected) : 1;
-    drawRobot(this, frame);
+    if (frame.localized) drawRobot(this, frame); // else it is nowhere in this map
     const moving = drawFlashes(this) || filling;
     this.facts.textContent = map
       ? `${map.corner_ids.length} corners · ${map.wall_ids.length} walls`
-        + (map.loop_methods.length ? ` · ${map.loop_methods.length} ties to earlier places` : "")
+        + (map.loop_methods.length ? ` · ${map.loop_methods.length} tie${map.loop_methods.length > 1 ? "s" : ""} to earlier places` : "")
       : "";
     return moving;
   }

@@ -3,6 +3,7 @@
 import { minutes } from "./charts.js";
 import { laneColour, stageColour } from "./colours.js";
 import { drawInnovations, drawLife } from "./corner_chart.js";
+import { drawHealth } from "./health.js";
 import { drawResponse, drawScan } from "./scan_chart.js";
 import { drawSeries, smooth } from "./series.js";
 
@@ -105,24 +106,16 @@ function corner(model, selected) {
 
 /** What the server says of itself. */
 export function drawStatus(model, seek) {
-  const { status } = model, facts = $("health"), behind = !status.paused && status.state === "mapping"
-    && status.speed !== null && status.reached > 0 && status.reached < 0.85 * status.speed;
-  facts.replaceChildren();
-  const fact = (label, value, tone = "") => { text("dt", label, facts); text("dd", value, facts).dataset.tone = tone; };
-  fact("scans", `${status.scans}`);
-  fact("scans a second", status.scan_rate.toFixed(1));
-  fact("speed", `${status.reached.toFixed(1)}×${behind ? ` of ${status.speed}×` : ""}`, behind ? "bad" : "");
-  fact("beams that returned", status.beams ? `${status.returned} of ${status.beams}` : "–");
-  const { median, most } = status.lag;
-  fact("page behind mapping", median === null ? "–" : `${median.toFixed(0)} ms, at most ${most.toFixed(0)} ms`,
-    median > 500 ? "bad" : "good");
-  fact("pages open", status.pages);
+  const { status, about } = model;
+  drawHealth(model);
   const words = {
-    starting: ["starting", "busy"], mapping: ["mapping", "busy"], refining: ["refining the map", "busy"],
-    finished: ["mapped to the end", "good"], failed: ["failed", "bad"],
+    starting: [about.live ? "waiting for a scan" : "starting", "busy"], mapping: ["mapping", "busy"],
+    refining: ["refining the map", "busy"], finished: ["mapped to the end", "good"], failed: ["failed", "bad"],
+    live: ["live", "good"], lost: ["looking for the robot", "bad"],
   };
   let [word, tone] = words[status.state] || [status.state, ""];
-  if (status.paused && status.state !== "finished") [word, tone] = ["paused", ""];
+  if (about.live && status.at !== null) [word, tone] = [status.paused ? "held" : "looking back", ""];
+  else if (status.paused && status.state !== "finished") [word, tone] = ["paused", ""];
   if (status.hurries_to !== null) [word, tone] = ["mapping ahead", "busy"];
   $("state").textContent = word;
   $("state").dataset.tone = tone;

@@ -29,6 +29,16 @@ export class Transport {
     });
   }
 
+  /** Another connection: of a recording, which can be paused, or of a robot, which goes on whatever a page holds. */
+  begin(live) {
+    this.live = live;
+    this.words = live ? ["Hold", "Go on", "Hold what is shown here; the robot goes on (space)"]
+      : ["Pause", "Play", "Play or pause (space)"];
+    $("play").title = this.words[2];
+    $("latest").textContent = live ? "Live" : "Newest";
+    $("latest").title = live ? "Go back to what is now" : "Go to the newest scan";
+  }
+
   addSpeed(speed) {
     const option = document.createElement("option");
     option.value = speed === null ? "max" : speed;
@@ -79,7 +89,8 @@ export class Transport {
     slider.setAttribute("aria-valuetext", `${minutes(Number(slider.value))} of ${minutes(length)}`);
     const on = this.goesOn(status);
     $("playicon").setAttribute("d", on ? PAUSE : PLAY);
-    $("play").setAttribute("aria-label", on ? "Pause" : "Play");
+    $("play").setAttribute("aria-label", this.words[on ? 0 : 1]);
+    $("speed").parentElement.hidden = this.live && status.at === null; // nothing but looking back has a speed
     $("latest").disabled = status.at === null;
     const value = status.speed === null ? "max" : String(status.speed), select = $("speed");
     if (document.activeElement !== select || select.dataset.known !== value) {
