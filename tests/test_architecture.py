@@ -29,6 +29,7 @@ ORDER = (
     "cli",
 )
 EXTRAS = {
+    "rerun",
     "serial",
     "websockets",
     "cv2",

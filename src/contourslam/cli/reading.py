@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from contourslam.recordings import Message
     from contourslam.report.occupancy import OccupancyGrid
+    from contourslam.scan import LaserScan
     from contourslam.slam.mapper import Mapper
-    from contourslam.slam.result import RunResult
+    from contourslam.slam.result import RunResult, ScanUpdate
 
 _WARM_UP = 20  # scans
 
@@ -131,6 +132,7 @@ class Work:
         make: "Callable[..., Mapper]",
         rehearse: "Callable[..., Mapper]",
         begin: "Callable[[Opening], NDArray[Any] | None]" = lambda opening: None,
+        on_scan: "Callable[[LaserScan, ScanUpdate], None] | None" = None,
     ) -> "RunResult":
         """Replay the recording until it ends or Ctrl-C is pressed.
 
@@ -141,6 +143,8 @@ class Work:
             time per scan.
         begin : callable
             Gives the pose at the first scan, where it is known.
+        on_scan : callable, optional
+            Called after each scan.
         """
         from contourslam.replay import replay
 
@@ -157,6 +161,7 @@ class Work:
                     self._settings,
                     initial_pose=pose,
                     lidar_mount=mount,
+                    on_scan=on_scan,
                     make=make,
                 )
             except (RecordingError, MapError):
@@ -195,7 +200,7 @@ class Work:
         options, settings = self._options, self._settings
         # A single scan has nothing to show.
         judged = None if self._relations is None or len(result.stamps) < 2 else judge(result, *self._relations)
-        metrics = run_metrics(result, relations=judged) | more
+        metrics = {"recording": options.recording.name} | run_metrics(result, relations=judged) | more
         grid = self._grid(result) if options.grid else None
         write_result_folder(options.output, result, settings, metrics, grid=grid, command=command)
         name = options.recording.name

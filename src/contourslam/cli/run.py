@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import tyro
 
-from contourslam.cli.console import note, print_json
+from contourslam.cli.console import complain, note, print_json
 from contourslam.cli.kept_map import KeptMap
 from contourslam.cli.options import Settings
 from contourslam.cli.reading import Opening, Reading, Work, tell_errors
@@ -17,6 +17,8 @@ from contourslam.config import Config, SlamConfig
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from contourslam.view.rerun_watch import WatchedRun
 
 _GRAPH = find_spec("gtsam") is not None
 DEFAULTS = Config(
@@ -53,6 +55,8 @@ class Run(Reading):
     """Go on in this map, the map.cmap of an earlier run in the same building; the graph can."""
     initial_pose: tuple[float, float, float] | None = None
     """Where the drive begins: x (m), y (m), heading (degrees); in a map to go on in roughly, else it is looked for."""
+    rerun: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
+    """Log the mapping scan by scan into this file too, for the Rerun viewer."""
     settings: Settings = field(default_factory=lambda: DEFAULTS)
 
     @classmethod
@@ -88,14 +92,26 @@ class Run(Reading):
             continued.find_start(opening, mount)
             return continued.pose
 
-        result = work.replay(continued.make, make_mapper, begin)
+        watched = None if self.rerun is None else self._watched(self.rerun)
+        make, on_scan = (continued.make, None) if watched is None else (watched.making(continued.make), watched.on_scan)
+        result = work.replay(make, make_mapper, begin, on_scan)
+        trouble = "" if watched is None else watched.finish(result)
         if len(result.stamps):
             metrics = work.write(result, {"back_end_reason": _reason(settings)}, command)
             continued.keep(self.output / "map.cmap", self.recording.name)
             for text in continued.notes:
                 note(text)
             _tell(self, metrics)
-        return work.exit_code()
+        if trouble:
+            complain(trouble)
+        return work.exit_code() or int(bool(trouble))
+
+    def _watched(self, path: Path) -> "WatchedRun":
+        from contourslam.view.rerun_watch import WatchedRun, open_log
+
+        settings = self.settings
+        log = open_log(path, self.recording.name, settings, [settings.detector], overwrite=self.overwrite)
+        return WatchedRun(log)
 
 
 def _reason(settings: Config) -> str:

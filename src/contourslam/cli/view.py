@@ -18,6 +18,7 @@ from contourslam.errors import ConfigError, RecordingError
 if TYPE_CHECKING:
     from contourslam.recordings import Message, Recording
     from contourslam.view.player import Player
+    from contourslam.view.rerun_watch import Copied
 
 _LOOK = 0.1  # s between two looks at Ctrl-C
 
@@ -49,6 +50,10 @@ class View:
     """Seconds of the recording per second; inf for as fast as possible. The page can change it."""
     paused: Flag = False
     """Wait until somebody presses play."""
+    rerun: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
+    """Log the mapping scan by scan into this file too, for the Rerun viewer."""
+    overwrite: Flag = False
+    """With --rerun, replace a file that is there."""
     page: Page = field(default_factory=Page)
     scan_topic: str | None = None
     """Topic of the scans; found by itself where there is only one."""
@@ -82,7 +87,8 @@ class View:
             "--truth-topic": self.truth_topic,
         }
         of_recordings = {
-            "--detectors": self.detectors, "--paused": self.paused, "--speed": self.speed != 1.0, **topics
+            "--detectors": self.detectors, "--paused": self.paused, "--speed": self.speed != 1.0,
+            "--rerun": self.rerun, **topics
         }  # fmt: skip
         if self.live and (given := [name for name, value in of_recordings.items() if value]):
             raise ConfigError(f"{' and '.join(given)} are for recordings; leave them out with --live")
@@ -102,16 +108,21 @@ class View:
             truth_topic=self.truth_topic,
         )
         pace = Pace(self.speed, paused=self.paused)
+        names = [name.strip() for name in self.detectors.split(",") if name.strip()]
+        copied = None if self.rerun is None else self._copied(self.rerun, path.name, names)
         replayed = Replayed(
             self._messages(recording),
             self.settings,
-            [name.strip() for name in self.detectors.split(",") if name.strip()],
+            names,
             title=path.name,
             duration=recording.duration,
             lidar_mount=recording.lidar_mount,
             pace=pace,
+            memory=copied,
         )
         player = replayed.player
+        if copied is not None:
+            copied.follow(player)
         with (
             Interrupt() as interrupt,
             self.page.served(replayed.show, replayed.lag, print_link),
@@ -119,12 +130,23 @@ class View:
             player.start()
             while not interrupt.requested and player.is_alive():
                 player.join(_LOOK)
+            if interrupt.requested:
+                pace.stop()
+                player.join()
+            if copied is not None and (trouble := copied.finish(recording.skipped)):
+                complain(trouble)
             _tell(player)
             while not interrupt.requested:  # all that was mapped can be looked at until somebody has seen enough
                 time.sleep(_LOOK)
             pace.stop()
             player.join()
         return 1 if player.trouble else 0
+
+    def _copied(self, file: Path, title: str, names: list[str]) -> "Copied":
+        from contourslam.view.rerun_watch import Copied, open_log
+
+        lanes = names or [self.settings.detector]
+        return Copied(open_log(file, title, self.settings, lanes, overwrite=self.overwrite), len(lanes))
 
     def _messages(self, recording: "Recording") -> "Iterator[Message]":
         from contourslam.scan import Odometry
