@@ -23,7 +23,7 @@ STATUS, STORY = 0.25, 1.0  # s
 # newest of them is ever sent.
 UNDRAWN, UNDRAWN_SLOW = 2, 1
 SLOW = 0.08  # s from sending to drawing
-SHARE = 0.03  # of one processor, no more, goes into a page while the mapping has no time to spare
+SHARE = 0.02  # of one processor, no more, goes into all pages while the mapping has no time to spare
 CHUNK = 300  # knots in one message
 
 
@@ -66,7 +66,7 @@ class Spectator:
                 await self._send(now)
                 spent = time.thread_time() - began  # what other pages took meanwhile is counted too, on the safe side
                 pressed = self._show.pace is None or self._show.pace.pressed
-                period = max(PERIOD, spent / SHARE) if pressed else PERIOD
+                period = max(PERIOD, self._lag.pages * spent / SHARE) if pressed else PERIOD
                 left = period - (time.monotonic() - now)
                 try:
                     await asyncio.wait_for(self._asked.wait(), max(left, 0.001))
@@ -89,7 +89,8 @@ class Spectator:
     def _obey(self, request: Request) -> None:
         if request.do == "drawn":
             self._drawn(int(request.value))
-        elif request.do == "story":
+            return  # the next frame comes in its time
+        if request.do == "story":
             number = int(request.value)
             self._story = (request.lane, number) if number >= 0 and request.lane < self._lanes else None
             self._story_at = 0.0
