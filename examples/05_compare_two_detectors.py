@@ -3,6 +3,7 @@
 import matplotlib.pyplot as plt
 
 from contourslam.experiments.compare import compare
+from contourslam.experiments.replays import MODES
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import ROOMS
 
@@ -15,7 +16,7 @@ def main() -> None:
         simulation=SimulationConfig(duration=20.0),
     )
     _, axes = plt.subplots(figsize=(8.0, 3.5), layout="constrained")
-    for mode, colour in (("walls", "tab:blue"), ("corners", "tab:orange")):
+    for mode, colour in zip(MODES, ("tab:orange", "tab:blue"), strict=True):
         for name, metrics in outcome.table(mode).items():
             rmse = {coordinate: metrics["rmse"][coordinate]["mean"] for coordinate in ("x", "y", "theta")}
             print(

@@ -11,7 +11,7 @@ from contourslam.cli import main
 from contourslam.cli.entry import COMMANDS, command_class, parse
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 
 
 def resolves(name: str) -> bool:
@@ -46,12 +46,13 @@ def test_every_full_name_in_a_document_exists() -> None:
 
 def test_every_link_between_documents_leads_somewhere() -> None:
     links = [
-        (document.name, target)
+        (document, target)
         for document in DOCUMENTS
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", document.read_text())
+        if not target.startswith("figures/")  # drawn when the site is built, whose own test follows its links
     ]
     assert links
-    assert [link for link in links if not (ROOT / link[1]).exists() and not (ROOT / "docs" / link[1]).exists()] == []
+    assert [link for link in links if not (link[0].parent / link[1]).exists()] == []
 
 
 def test_every_benchmark_has_its_place_in_the_tables() -> None:
@@ -64,7 +65,7 @@ def test_every_benchmark_has_its_place_in_the_tables() -> None:
 
 def test_every_command_in_a_document_parses() -> None:
     lines = [line.strip() for document in DOCUMENTS for line in document.read_text().splitlines()]
-    commands = [line for line in lines if line.startswith("contourslam ")]
+    commands = [line for line in lines if re.match(r"contourslam [a-z]", line)]
     assert {line.split()[1] for line in commands} >= COMMANDS.keys() - {"compare"}
     for line in commands:
         words = shlex.split(line, comments=True)[1:]

@@ -1,0 +1,67 @@
+"""The blocks of the documents that can be run, and what they need to be there."""
+
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted(
+    path
+    for pattern in ("*.md", "docs/**/*.md", "firmware/mega/README.md", "ros2/contourslam_ros/README.md")
+    for path in ROOT.glob(pattern)
+    if "build" not in path.parts
+)
+"""Every document that becomes a page of the site."""
+
+ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "with the firmware")
+"""Titles of blocks that cannot be run here: their commands are only held against the real parser."""
+SERVES = "until Ctrl-C"
+"""Title of a block whose commands serve until Ctrl-C."""
+ONCE = "once"
+"""Title of a block that installs: the newcomer's tests do that."""
+
+_BLOCK = re.compile(
+    r"^(?P<indent> *)```(?P<kind>bash|python)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$",
+    re.MULTILINE | re.DOTALL,
+)
+_NEEDS = re.compile(r"<!-- needs: (.*?) -->")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A block of a document: "bash" or "python", its title, its lines without what they are indented by."""
+
+    kind: str
+    title: str
+    text: str
+
+    @property
+    def file(self) -> bool:
+        """Whether the title names a file that the block is the content of."""
+        return bool(re.fullmatch(r"[\w./-]+\.(py|yaml|sh)", self.title))
+
+    @property
+    def run(self) -> bool:
+        """Whether it is run where it stands."""
+        return self.title in ("", SERVES)
+
+    def lines(self) -> list[str]:
+        """Commands of a block of the shell, one each, lines that go on joined."""
+        joined = re.sub(r"\\\n\s*", " ", self.text)
+        return [line for line in joined.splitlines() if shlex.split(line, comments=True, posix=False)]
+
+
+def blocks(document: Path) -> list[Block]:
+    """All blocks of a document, in order."""
+    found = []
+    for block in _BLOCK.finditer(document.read_text()):
+        lines = block["text"].splitlines(keepends=True)
+        text = "".join(line.removeprefix(block["indent"]) for line in lines)
+        found.append(Block(block["kind"], block["title"] or "", text))
+    return found
+
+
+def needs(document: Path) -> list[str]:
+    """Names of the files and folders that must be there before a document's commands are run."""
+    return " ".join(_NEEDS.findall(document.read_text())).split()
