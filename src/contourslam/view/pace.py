@@ -141,6 +141,10 @@ class Pace:
             with self._changed:
                 self._changed.wait(min(left, NAP))
 
+    def rest(self) -> None:
+        """Note that nothing more is to be mapped."""
+        self.pressed = False
+
     def _left(self, elapsed: float) -> float:
         """Seconds to wait; a step that is used up is counted off."""
         now = self._clock()

@@ -72,6 +72,8 @@ class Player(threading.Thread):
             self._play()
         except Exception as error:  # told to whoever started the thread
             self.error, self.state, self.trouble = error, "failed", str(error) or repr(error)
+        finally:
+            self._pace.rest()
 
     def _play(self) -> None:
         try:

@@ -55,6 +55,7 @@ class Spectator:
     async def serve(self) -> None:
         """Send and listen until the connection ends."""
         listening = asyncio.ensure_future(self._listen())
+        listening.add_done_callback(lambda _: self._asked.set())
         last = time.monotonic()
         try:
             while not listening.done():
