@@ -54,9 +54,15 @@ def test_the_page_is_whole_accessible_and_refers_to_nothing_outside(report, pars
     assert len(page.all("caption")) == len(page.all("table"))
 
 
-def test_every_figure_that_was_drawn_is_on_the_page(report, parsed):
-    shown = {image["src"] for image in parsed((report / "index.html").read_text()).all("img")}
-    assert {f"figures/{path.name}" for path in (report / "figures").iterdir()} == shown
+def test_every_figure_that_was_drawn_is_on_the_page_and_each_drawing_to_be_had_as_pdf(report, parsed):
+    page = parsed((report / "index.html").read_text())
+    shown = {image["src"] for image in page.all("img")}
+    linked = {link["href"] for link in page.all("a") if link["href"].startswith("figures/")}
+    assert {f"figures/{path.name}" for path in (report / "figures").iterdir()} == shown | linked
+    drawn = {name.removesuffix(".svg") for name in shown if name.endswith(".svg")}
+    assert drawn == {name.removesuffix(".pdf") for name in linked if name.endswith(".pdf")}
+    for name in drawn:
+        assert (report / f"{name}.pdf").read_bytes().startswith(b"%PDF-")
 
 
 def test_the_figures_load_nothing_from_outside(report):

@@ -10,12 +10,13 @@ from contourslam import __version__
 from contourslam.atomic import make_folder, write_bytes, write_text
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.experiments.loop_values import FAULTS, LoopResult
-from contourslam.report.page.album import embedded
-from contourslam.report.page.markup import Cell, Picture, Row, Section, figure, page, pair, paragraph, table, tiles
+from contourslam.report.page import album
+from contourslam.report.page.markup import Cell, Picture, Row, Section, page, pair, paragraph, table, tiles
 from contourslam.report.page.run import reproduce, truth
+from contourslam.report.page.run.facts import map_facts
 from contourslam.report.page.run.values import RunValues, clock, count
 from contourslam.report.result_folder import write_result_folder
-from contourslam.report.svg.loop import loop_drawing
+from contourslam.report.svg.loop import known_then, loop_drawing
 from contourslam.simulation.config import YDLIDAR_X4
 from contourslam.simulation.rooms import ROOMS
 
@@ -79,7 +80,7 @@ def write_loop_report(folder: Path, result: LoopResult, *, command: str = "") ->
     write_result_folder(folder, result.run, result.settings, metrics, command=command)
     values = RunValues(result.run, result.settings, metrics, None, command)
     parts = [
-        _way(result), truth.section(values), _punctuality(result), _line(result), _pictures(folder, result),
+        _way(result, values), truth.section(values), _punctuality(result), _line(result), _pictures(folder, result),
         reproduce.section(values),
     ]  # fmt: skip
     text = page(
@@ -88,6 +89,7 @@ def write_loop_report(folder: Path, result: LoopResult, *, command: str = "") ->
         summary=_headline(result),
         sections=[part for part in parts if part is not None],
         footer=f"Written by contourslam {__version__}.",
+        scripts=album.SCRIPTS,
         banner="" if kept(result) else "The errors are larger than they may be; see how punctual the world was.",
     )
     write_text(folder / "index.html", text)
@@ -129,16 +131,19 @@ def _headline(result: LoopResult) -> str:
     return tiles(shown)
 
 
-def _way(result: LoopResult) -> Section:
+def _way(result: LoopResult, values: RunValues) -> Section:
     room = ROOMS[result.config.room]
     size = result.run
-    picture = embedded(
+    figure = album.drawn(
         loop_drawing(size, room.segments(YDLIDAR_X4.mount_height), result.record.poses),
+        kind="map",
+        name="way",
         alt="Map made by the robot over the true room, with the way it drove and the way it took itself to drive",
         caption="The room at the lidar's height, what was mapped of it, the true way, and the poses by which the robot "
         f"steered: {count(len(size.corner_map.ids), 'corner')}, {count(len(size.wall_map.ids), 'wall')}.",
+        facts=map_facts(values, known_then(size)),
     )
-    return Section("way", "Map and way", figure(picture))
+    return Section("way", "Map and way", figure)
 
 
 def _punctuality(result: LoopResult) -> Section:

@@ -7,6 +7,7 @@ from contourslam import __version__
 from contourslam.atomic import make_folder, remove, write_text
 from contourslam.config import Config
 from contourslam.evaluation.relations import JudgedRelations
+from contourslam.report.page import album
 from contourslam.report.page.markup import page
 from contourslam.report.page.run import building, loops, matching, reproduce, timings, truth
 from contourslam.report.page.run import relations as known
@@ -75,5 +76,6 @@ def write_run_page(
         sections=[part for part in parts if part is not None],
         footer=f"Written by contourslam {__version__}.",
         banner="" if result.complete else _INCOMPLETE,
+        scripts=album.SCRIPTS,
     )
     write_text(folder / "index.html", text)

@@ -7,6 +7,7 @@ from importlib.resources import files
 
 SCRIPTS = ("theme.js", "folds.js", "tables.js")
 """What runs on every page, files beside this one."""
+STYLES = ("style.css", "drawn.css")
 
 
 def shell(more: Sequence[str] = ()) -> dict[str, str]:
@@ -22,7 +23,7 @@ def shell(more: Sequence[str] = ()) -> dict[str, str]:
     dict of str to str
         "style", "script" and "policy": the last lets nothing run but these two, and nothing load but pictures.
     """
-    style = _read("style.css")
+    style = "\n".join(map(_read, STYLES))
     script = "\n".join(_read(name) for name in (*SCRIPTS, *more))
     policy = (
         f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; "

@@ -1,23 +1,24 @@
-"""A pair of axes with what is drawn in them, as SVG text."""
+"""A pair of axes with what is drawn in them, as SVG text.
+
+The text says by ``data-`` attributes what is what, so that the page's scripts can move, read and switch it.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.report.svg import paths
+from contourslam.report.svg.colours import FAINT, GREY, GRID, SHADES
+from contourslam.report.svg.ticks import decades, ticks
+
 Floats = NDArray[np.float64]
 
-# Colours that the colour-blind can tell apart (Okabe and Ito 2008).
-BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY = "#0072b2", "#e69f00", "#009e73", "#d55e00", "#aa4499", "#7cc4f0"
-INK, GREY, FAINT = "#222222", "#767676", "#c9c9c9"
-SHADES = (
-    "#f0f921", "#fcd225", "#fdae32", "#f68d45", "#e76f5a", "#d5546e", "#c03a83", "#a62098", "#8606a6", "#6300a7",
-    "#3e049c", "#0d0887",
-)  # fmt: skip
-"""From little to much."""
 _LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 14.0, 24.0, 42.0  # px around the axes
+_FARTHEST = 16_000.0  # px; viewers cannot draw what lies much farther out
 
 
 class Axes:
@@ -31,10 +32,14 @@ class Axes:
         Of the rectangle, px.
     labels : (str, str)
         Of the two axes.
+    unit : str
+        Of the second one's values, where the page shows them.
     logarithmic : bool
         Of the second one.
     offset : (float, float)
         Upper left corner of the axes and all that is around them, px.
+    digits : int
+        Decimals of a px that are kept.
     """
 
     def __init__(
@@ -45,8 +50,10 @@ class Axes:
         height: float,
         *,
         labels: tuple[str, str] = ("", ""),
+        unit: str = "",
         logarithmic: bool = False,
         offset: tuple[float, float] = (0.0, 0.0),
+        digits: int = 1,
     ) -> None:
         self.width, self.height = width, height
         self._log = logarithmic
@@ -54,7 +61,7 @@ class Axes:
         self._left, self._top = offset[0] + _LEFT, offset[1] + _TOP
         self._inside: list[str] = []
         self._outside: list[str] = []
-        self._labels = labels
+        self._labels, self._unit, self._digits = labels, unit, digits
 
     @property
     def outer(self) -> tuple[float, float]:
@@ -65,65 +72,116 @@ class Axes:
         return np.log10(np.maximum(y, 1e-12)) if self._log else y
 
     def pixels(self, x: Floats, y: Floats) -> Floats:
-        """Give points in px, shape (n, 2), none farther out than a frame's width, for viewers cannot draw that."""
+        """Give points in px, shape (n, 2), none so far out that viewers cannot draw it."""
         across = (np.asarray(x) - self._x[0]) / (self._x[1] - self._x[0])
         up = (self._scaled(np.asarray(y, dtype=np.float64)) - self._y[0]) / (self._y[1] - self._y[0])
         at = np.stack([self._left + self.width * across, self._top + self.height * (1.0 - up)], axis=-1)
-        return np.asarray(np.clip(at, -2000.0, 4000.0))
+        return np.asarray(np.clip(at, -_FARTHEST, _FARTHEST))
 
-    def line(self, x: Floats, y: Floats, colour: str, width: float = 1.0) -> None:
-        """Draw a line; it is broken where a value is not finite."""
+    @contextmanager
+    def layer(self, name: str, *, shown: bool = True) -> Iterator[None]:
+        """Whatever is drawn within belongs together and can be switched on the page."""
+        self._inside.append(f'<g data-layer="{name}"{"" if shown else _HIDDEN}>')
+        yield
+        self._inside.append("</g>")
+
+    def line(self, x: Floats, y: Floats, colour: str, width: float = 1.0, *, name: str = "") -> None:
+        """Draw a line; it is broken where a value is not finite. The page tells the values of one with a name."""
         at = self.pixels(x, y)
         known = np.array(np.isfinite(at).all(axis=1))
         begins = known & ~np.concatenate([[False], known[:-1]])
-        words = [
-            f"{'M' if begin else ''}{u:.1f} {v:.1f}" for (u, v), begin in zip(at[known], begins[known], strict=True)
-        ]
-        self._inside.append(f'<path d="{" ".join(words)}" fill="none" stroke="{colour}" stroke-width="{width}"/>')
+        path = paths.lines(at[known], begins[known], self._digits)
+        self._inside.append(
+            f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"'
+            f"{_named(name)}/>"
+        )
+
+    def trace(self, points: Floats, colour: str, width: float = 1.0) -> None:
+        """Draw a line through points, shape (n, 2) or with more columns."""
+        self.line(points[:, 0], points[:, 1], colour, width)
 
     def segments(self, ends: Floats, colours: str | Sequence[str], width: float = 1.0) -> None:
         """Draw straight lines, shape (n, 2, 2), in their order."""
-        at = self.pixels(ends[..., 0].ravel(), ends[..., 1].ravel()).reshape(-1, 4).tolist()
-        self._by_colour([f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for a, b, c, d in at], colours, width)
+        at = self.pixels(ends[..., 0].ravel(), ends[..., 1].ravel()).reshape(-1, 2, 2)
+        self._by_colour(at, paths.segments, colours, width)
 
     def dots(self, points: Floats, colours: str | Sequence[str], size: float, opacity: float = 1.0) -> None:
         """Draw round dots, shape (n, 2), in their order."""
-        at = self.pixels(points[:, 0], points[:, 1]).tolist()
-        self._by_colour([f"M{a:.1f} {b:.1f}h0" for a, b in at], colours, size, opacity)
+        at = self.pixels(points[:, 0], points[:, 1])
+        self._by_colour(at, paths.dots, colours, size, opacity)
 
-    def squares(self, points: Floats, fill: str, colour: str, size: float = 3.4) -> None:
-        """Draw little squares."""
-        at = (self.pixels(points[:, 0], points[:, 1]) - 0.5 * size).tolist()
-        path = "".join(f"M{a:.1f} {b:.1f}h{size}v{size}h-{size}z" for a, b in at)
-        self._inside.append(f'<path d="{path}" fill="{fill}" stroke="{colour}" stroke-width="0.8"/>')
+    def cloud(self, points: Floats, colour: str, size: float, opacity: float) -> None:
+        """Draw many round dots, shape (n, 2), to whole px, and one for all that fall there."""
+        at = np.unique(self.pixels(points[:, 0], points[:, 1]).round(), axis=0)
+        self._inside.append(
+            f'<path d="{"".join(paths.dots(at, 0))}" fill="none" stroke="{colour}" stroke-width="{size}" '
+            f'stroke-linecap="round" stroke-opacity="{opacity}"/>'
+        )
 
-    def band(self, x: Floats, low: Floats, high: Floats) -> None:
-        """Fill what lies between two lines."""
-        at = np.concatenate([self.pixels(x, low), self.pixels(x, high)[::-1]])
-        words = " ".join(f"{u:.1f},{v:.1f}" for u, v in at[np.isfinite(at).all(axis=1)].tolist())
-        self._inside.append(f'<polygon points="{words}" fill="{FAINT}" fill-opacity="0.7"/>')
+    def squares(self, points: Floats, fill: str, colour: str, size: float = 4.4) -> None:
+        """Draw little squares with an edge: they are ends of lines, and so stay as large when the page zooms."""
+        at = "".join(paths.dots(self.pixels(points[:, 0], points[:, 1]), self._digits))
+        for stroke, width in ((colour, size), (fill, size - 1.6)):
+            self._inside.append(
+                f'<path d="{at}" fill="none" stroke="{stroke}" stroke-width="{width:g}" stroke-linecap="square"/>'
+            )
+
+    def ellipses(self, points: Floats, covariances: Floats, sigmas: float, colour: str) -> None:
+        """Draw ellipses of so many standard deviations, shapes (n, 2) and (n, 2, 2); axes of one scale only."""
+        variances, directions = np.linalg.eigh(covariances)
+        radii = sigmas * np.sqrt(np.maximum(variances, 0.0)) * self.width / (self._x[1] - self._x[0])
+        turns = -np.degrees(np.arctan2(directions[:, 1, 1], directions[:, 0, 1]))
+        pieces = []
+        for (u, v), (small, large), turn in zip(
+            self.pixels(points[:, 0], points[:, 1]).tolist(), radii.tolist(), turns.tolist(), strict=True
+        ):
+            du, dv = large * math.cos(math.radians(turn)), large * math.sin(math.radians(turn))
+            arc = f"a{large:.3g} {small:.3g} {turn:.0f} 1 1 "
+            pieces.append(f"M{u - du:.3f} {v - dv:.3f}{arc}{2 * du:.3f} {2 * dv:.3f}{arc}{-2 * du:.3f} {-2 * dv:.3f}z")
+        self._inside.append(f'<path d="{"".join(pieces)}" fill="{colour}" fill-opacity="0.25" stroke="{colour}"/>')
+
+    def band(self, x: Floats, low: Floats, high: Floats, *, name: str = "") -> None:
+        """Fill what lies between two lines; the page tells the values of a band with a name."""
+        at = np.stack([self.pixels(x, low), self.pixels(x, high)])
+        at = at[:, np.isfinite(at).all(axis=(0, 2))]
+        begins = np.arange(2 * at.shape[1]) == 0
+        path = paths.lines(np.concatenate([at[0], at[1, ::-1]]), begins, self._digits)
+        self._inside.append(f'<path d="{path}z" fill="{FAINT}" fill-opacity="0.7"{_named(name)}/>')
 
     def rule(self, y: float) -> None:
         """Draw a line from side to side."""
         self.line(np.array(self._x), np.array([y, y]), GREY, 0.8)
 
-    def legend(self, entries: Sequence[tuple[str, str]]) -> None:
-        """Name colours above the axes."""
-        left = self._left
-        for name, colour in entries:
-            mark = f'<path d="M{left:.0f} {self._top - 12:.0f}h16" stroke="{colour}" stroke-width="4"/>'
-            self._outside += [mark, _text(left + 21, self._top - 8, name, "start")]
-            left += 36.0 + 6.6 * len(name)
+    def legend(self, entries: Sequence[tuple[str, str] | tuple[str, str, str, bool]]) -> None:
+        """Name colours above the axes: name and colour, or these with a layer and whether it is shown."""
+        left, marks = self._left, []
+        for name, colour, *rest in entries:
+            layer, shown = rest or ("", True)
+            mark = (
+                f'<path d="M{left:.0f} {self._top - 12:.0f}h16" stroke="{colour}" stroke-width="4"/>'
+                f"{_text(left + 21, self._top - 8, name, 'start')}"
+            )
+            of = f' data-of="{layer}"' if layer else ""
+            marks.append(f"<g{of}{'' if shown else _HIDDEN}>{mark}</g>")
+            left += 36.0 + 6.6 * len(name) if shown else 0.0
+        self._outside.append('<g data-legend="">' + "".join(marks) + "</g>")
 
-    def _by_colour(self, paths: list[str], colours: str | Sequence[str], width: float, opacity: float = 1.0) -> None:
+    def _by_colour(
+        self,
+        at: Floats,
+        piece: Callable[[Floats, int], list[str]],
+        colours: str | Sequence[str],
+        width: float,
+        opacity: float = 1.0,
+    ) -> None:
         """Draw in order; neighbours of one colour share an element."""
         if isinstance(colours, str):
-            colours = [colours] * len(paths)
+            colours = [colours] * len(at)
+        faint = f' stroke-opacity="{opacity}"' if opacity < 1.0 else ""
         begin = 0
-        for end in range(1, len(paths) + 1):
-            if end == len(paths) or colours[end] != colours[begin]:
-                path = "".join(paths[begin:end])
-                faint = f' stroke-opacity="{opacity}"' if opacity < 1.0 else ""
+        for end in range(1, len(at) + 1):
+            if end == len(at) or colours[end] != colours[begin]:
+                path = "".join(piece(at[begin:end], self._digits))
                 self._inside.append(
                     f'<path d="{path}" fill="none" stroke="{colours[begin]}" stroke-width="{width}" '
                     f'stroke-linecap="round"{faint}/>'
@@ -132,32 +190,34 @@ class Axes:
 
     def svg(self) -> str:
         """Give all of it as SVG elements."""
-        right, bottom = self._left + self.width, self._top + self.height
+        left, top, right, bottom = self._left, self._top, self._left + self.width, self._top + self.height
         grid, words = [], []
         for value in ticks(*self._x):
             at = float(self.pixels(np.array([value]), np.ones(1))[0, 0])
-            grid.append(f"M{at:.1f} {self._top:.1f}V{bottom:.1f}")
+            grid.append(f"M{at:.1f} {top:.1f}V{bottom:.1f}")
             words.append(_text(at, bottom + 16, f"{value:g}", "middle"))
-        for value in _decades(*self._y) if self._log else ticks(*self._y):
+        for value in decades(*self._y) if self._log else ticks(*self._y):
             at = float(self.pixels(np.zeros(1), np.array([value]))[0, 1])
-            grid.append(f"M{self._left:.1f} {at:.1f}H{right:.1f}")
-            words.append(_text(self._left - 7, at + 4, f"{value:g}", "end"))
-        middle = self._top + 0.5 * self.height
-        words.append(_text(0.5 * (self._left + right), bottom + 35, self._labels[0], "middle"))
-        words.append(
-            f'<text transform="translate({self._left - 46:.1f} {middle:.1f}) rotate(-90)" text-anchor="middle">'
-            f"{escape(self._labels[1])}</text>"
-        )
-        clip = f"c{self._left:.0f}-{self._top:.0f}"
-        frame = f'x="{self._left:.1f}" y="{self._top:.1f}" width="{self.width:.1f}" height="{self.height:.1f}"'
+            grid.append(f"M{left:.1f} {at:.1f}H{right:.1f}")
+            words.append(_text(left - 7, at + 4, f"{value:g}", "end"))
+        turned = f"translate({left - 46:.1f} {top + 0.5 * self.height:.1f}) rotate(-90)"
+        frame = f'x="{left:.1f}" y="{top:.1f}" width="{self.width:.1f}" height="{self.height:.1f}"'
+        box = f"{left:.1f} {top:.1f} {self.width:.1f} {self.height:.1f}"
+        kind = ' data-log=""' if self._log else ""
+        spans = f'data-x="{_span(self._x)}" data-y="{_span(self._y)}"{kind}'
         parts = [
-            f'<clipPath id="{clip}"><rect {frame}/></clipPath>',
-            f'<path d="{"".join(grid)}" stroke="#e6e6e6" stroke-width="0.7"/>',
-            f'<g clip-path="url(#{clip})">',
+            f'<g data-panel="" {spans} data-unit="{escape(self._unit)}">',
+            f'<path data-grid="" d="{"".join(grid)}" stroke="{GRID}" stroke-width="0.7"/>',
+            # A drawing within the drawing cuts off what sticks out, without a name that another could have too.
+            f'<svg data-inside="" {frame} viewBox="{box}" preserveAspectRatio="none">',
             *self._inside,
-            f'</g><rect {frame} fill="none" stroke="{GREY}" stroke-width="0.8"/>',
-            *words,
+            f'</svg><rect data-frame="" {frame} fill="none" stroke="{GREY}" stroke-width="0.8"/>',
+            '<g data-ticks="">' + "".join(words) + "</g>",
+            f'<text data-label="x" x="{0.5 * (left + right):.1f}" y="{bottom + 35:.1f}" text-anchor="middle">'
+            f"{escape(self._labels[0])}</text>",
+            f'<text data-label="y" transform="{turned}" text-anchor="middle">{escape(self._labels[1])}</text>',
             *self._outside,
+            "</g>",
         ]
         return "\n".join(parts)
 
@@ -165,37 +225,26 @@ class Axes:
         """Draw the scale of the shades, logarithmic from low to high, on the right of the axes."""
         left, height = self._left + self.width + 16.0, 0.6 * self.height
         top, step = self._top + 0.2 * self.height, 0.6 * self.height / len(SHADES)
+        parts = []
         for k, shade in enumerate(reversed(SHADES)):
             box = f'x="{left:.1f}" y="{top + k * step:.1f}" width="12" height="{step + 0.5:.1f}"'
-            self._outside.append(f'<rect {box} fill="{shade}"/>')
+            parts.append(f'<rect {box} fill="{shade}"/>')
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             value = low * (high / low) ** share
-            self._outside.append(_text(left + 17, top + height * (1.0 - share) + 4, f"{value:.2g}", "start"))
-        self._outside.append(_text(left - 8, top - 12, label, "start"))
+            parts.append(_text(left + 17, top + height * (1.0 - share) + 4, f"{value:.2g}", "start"))
+        parts.append(_text(left - 8, top - 12, label, "start"))
+        self._outside.append('<g data-scale="">' + "".join(parts) + "</g>")
 
 
-def shades(values: Floats) -> tuple[list[str], float, float]:
-    """Give each value its shade on a logarithmic scale between the values' own bounds, and these."""
-    low, high = np.quantile(values, [0.02, 1.0]).tolist()
-    low = max(low, 1e-3)
-    high = max(high, 1.1 * low)
-    share = np.log(np.clip(values, low, high) / low) / math.log(high / low)
-    steps = np.minimum((share * len(SHADES)).astype(np.int64), len(SHADES) - 1)
-    return [SHADES[step] for step in steps], low, high
+_HIDDEN = ' display="none"'
 
 
-def ticks(low: float, high: float) -> list[float]:
-    """Give about six round numbers between two."""
-    step = 10.0 ** math.floor(math.log10((high - low) / 4.0))
-    step *= next(factor for factor in (5.0, 2.0, 1.0) if step * factor <= (high - low) / 4.0)
-    return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+def _named(name: str) -> str:
+    return f' data-name="{escape(name)}"' if name else ""
 
 
-def _decades(low: float, high: float) -> list[float]:
-    """Give 1, 2, 5 times the powers of ten between two logarithms; the powers alone where they are many."""
-    factors = (1.0, 2.0, 5.0) if high - low < 4.0 else (1.0,)
-    values = [f * 10.0**k for k in range(math.floor(low), math.ceil(high) + 1) for f in factors]
-    return [value for value in values if low - 1e-9 <= math.log10(value) <= high + 1e-9]
+def _span(span: tuple[float, float] | Floats) -> str:
+    return f"{span[0]:.9g} {span[1]:.9g}"
 
 
 def _text(x: float, y: float, text: str, anchor: str) -> str:

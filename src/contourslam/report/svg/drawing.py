@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from contourslam.report.svg.axes import INK, Axes
+from contourslam.report.svg.axes import Axes
+from contourslam.report.svg.colours import INK, SHEET
 
 SCALE_WIDTH = 96.0  # px that a scale of shades takes beside its axes
 
@@ -15,7 +16,7 @@ class Drawing:
     Attributes
     ----------
     text : str
-        A whole SVG document that refers to nothing outside.
+        A whole SVG document that refers to nothing outside, and has no ids: any number of them can stand in a page.
     width, height : int
         px.
     """
@@ -33,5 +34,5 @@ def drawing(panels: Sequence[Axes], *, beside: float = 0.0) -> Drawing:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
         f'font-family="system-ui, sans-serif" font-size="12" fill="{INK}">'
     )
-    sheet = '<rect width="100%" height="100%" fill="white"/>'
+    sheet = f'<rect width="100%" height="100%" fill="{SHEET}"/>'
     return Drawing("\n".join([head, sheet, *(panel.svg() for panel in panels), "</svg>\n"]), width, height)

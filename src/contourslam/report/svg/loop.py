@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.report.svg.axes import BLUE, FAINT, INK, ORANGE, VERMILION
+from contourslam.report.svg.colours import BLUE, FAINT, INK, ORANGE, SHEET, VERMILION
 from contourslam.report.svg.drawing import Drawing, drawing
-from contourslam.report.svg.way import axes_around
+from contourslam.report.svg.way import axes_around, corner_order, sampled
 from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]
@@ -23,16 +23,26 @@ def loop_drawing(result: RunResult, outline: Floats, truth: Floats) -> Drawing:
     truth : ndarray, shape (n, 3)
         True poses, close together.
     """
-    poses = result.poses if result.online_poses is None else result.online_poses
+    poses = known_then(result)
     axes = axes_around(np.concatenate([outline.reshape(-1, 2), truth[:, :2], poses[:, :2]]))
-    axes.segments(outline, FAINT, 5.0)
-    axes.segments(result.wall_map.end_points, BLUE, 1.6)
-    axes.squares(result.corner_map.positions, "white", VERMILION)
-    way = truth[:: max(1, len(truth) // 2000)]
-    axes.line(way[:, 0], way[:, 1], ORANGE, 3.0)
-    axes.line(poses[:, 0], poses[:, 1], INK, 0.9)
+    with axes.layer("room"):
+        axes.segments(outline, FAINT, 5.0)
+    with axes.layer("walls"):
+        axes.segments(result.wall_map.end_points, BLUE, 1.6)
+    with axes.layer("corners"):
+        axes.squares(result.corner_map.positions[corner_order(result)], SHEET, VERMILION)
+    with axes.layer("truth"):
+        axes.trace(truth[:: max(1, len(truth) // 2000)], ORANGE, 3.0)
+    with axes.layer("way"):
+        axes.trace(poses[sampled(len(poses))], INK, 0.9)
     axes.legend(
-        [("the room", FAINT), ("wall mapped", BLUE), ("corner mapped", VERMILION), ("true way", ORANGE),
-         ("way by the robot's own poses", INK)]
+        [("the room", FAINT, "room", True), ("wall mapped", BLUE, "walls", True),
+         ("corner mapped", VERMILION, "corners", True), ("true way", ORANGE, "truth", True),
+         ("way by the robot's own poses", INK, "way", True)]
     )  # fmt: skip
     return drawing([axes])
+
+
+def known_then(result: RunResult) -> Floats:
+    """Poses as they were known at the time, shape (t, 3)."""
+    return result.poses if result.online_poses is None else result.online_poses

@@ -7,7 +7,8 @@ from contourslam.geometry.poses import transform
 from contourslam.localization.known_map import KnownMap
 from contourslam.localization.posterior import Located
 from contourslam.localization.view import View
-from contourslam.report.svg.axes import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION, Axes
+from contourslam.report.svg.axes import Axes
+from contourslam.report.svg.colours import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION
 from contourslam.report.svg.drawing import Drawing, drawing
 from contourslam.report.svg.way import axes_around
 

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap
-from contourslam.report.svg.axes import BLUE, GREEN, GREY, ORANGE, Axes
+from contourslam.report.svg.axes import Axes
+from contourslam.report.svg.colours import BLUE, GREEN, GREY, ORANGE, VERMILION
 from contourslam.report.svg.drawing import Drawing, drawing
 from contourslam.slam.result import RunResult
 
@@ -18,7 +19,6 @@ _PIECES = 250
 """Lines are drawn through the medians of this many pieces of the run: the eye cannot tell more."""
 _LEAST = 1e-3
 """Errors below it are drawn at it: a logarithmic scale has no zero, m."""
-_MAX_DOTS = 4000
 _COLOURS = {"estimate": BLUE, "online": GREEN, "raw odometry": ORANGE}
 
 
@@ -39,50 +39,60 @@ def relation_drawing(times: Floats, errors: Mapping[str, Floats]) -> Drawing:
         _WIDTH,
         320.0,
         labels=("time (s)", "relation error (m)"),
+        unit="m",
         logarithmic=True,
     )
     shown = [(name, np.maximum(values, _LEAST)) for name, values in reversed(list(errors.items()))]
     for name, values in shown:
-        every = slice(None, None, max(1, len(times) // _MAX_DOTS))
-        axes.dots(np.stack([times[every], values[every]], axis=-1), _COLOURS.get(name, GREY), 3.0, 0.5)
+        axes.cloud(np.stack([times, values], axis=-1), _COLOURS.get(name, GREY), 3.0, 0.6)
     for name, values in shown:
         at, middle, _, _ = pieces(times, values, 60)
-        axes.line(at, middle, _COLOURS.get(name, GREY), 2.0)
+        axes.line(at, middle, _COLOURS.get(name, GREY), 2.0, name=f"{name}, median")
     axes.legend([(name, _COLOURS.get(name, GREY)) for name in errors])
     return drawing([axes])
 
 
 def matching_drawing(result: RunResult) -> Drawing:
-    """Draw matching quality, where it is known, above the normalised innovation squared per degree of freedom.
+    """Draw, one below the other, what is known of: matching quality, NIS per degree of freedom, stated uncertainty.
 
     Parameters
     ----------
     result : RunResult
-        With one scan or more, and one of the two.
+        With one scan or more, and one of the three.
     """
-    times, span = result.stamps - result.stamps.min(), _span(result.stamps - result.stamps.min())
-    corrected = result.nis_dof > 0
+    times, corrected = result.stamps - result.stamps.min(), result.nis_dof > 0
     panels: list[Axes] = []
+
+    def panel(y: tuple[float, float], label: str, unit: str = "", *, logarithmic: bool) -> Axes:
+        offset = (0.0, sum(one.outer[1] for one in panels))
+        labels = ("time (s)", label)
+        panels.append(
+            Axes(_span(times), y, _WIDTH, 150.0, labels=labels, unit=unit, logarithmic=logarithmic, offset=offset)
+        )
+        return panels[-1]
+
     if result.quality is not None:
-        axes = Axes(span, (-0.03, 1.03), _WIDTH, 150.0, labels=("time (s)", "matching quality"))
-        _band(axes, times, result.quality, GREEN)
-        panels.append(axes)
+        _band(panel((-0.03, 1.03), "matching quality", logarithmic=False), times, result.quality, GREEN)
     if corrected.any():
         ratio = np.maximum(result.nis[corrected] / result.nis_dof[corrected], 1e-2)
         _, _, low, high = pieces(times[corrected], ratio, _PIECES)
-        axes = Axes(
-            span,
-            (min(0.5, float(low.min())), 1.2 * max(2.0, float(high.max()))),
-            _WIDTH,
-            150.0,
-            labels=("time (s)", "NIS per d. o. f."),
-            logarithmic=True,
-            offset=(0.0, sum(panel.outer[1] for panel in panels)),
-        )
+        span = (min(0.5, float(low.min())), 1.2 * max(2.0, float(high.max())))
+        axes = panel(span, "NIS per d. o. f.", logarithmic=True)
         _band(axes, times[corrected], ratio, BLUE)
         axes.rule(1.0)
-        panels.append(axes)
+    sigmas = 100.0 * position_sigmas(result)
+    if (sigmas > 0.0).any():
+        sigmas = np.maximum(
+            sigmas, 0.01 * float(sigmas.max())
+        )  # a logarithm knows no zero, which is what the first may be
+        span = (0.8 * float(sigmas.min()), max(1.25 * float(sigmas.max()), 5.0 * float(sigmas.min())))
+        _band(panel(span, "position σ (cm)", "cm", logarithmic=True), times, sigmas, VERMILION)
     return drawing(panels)
+
+
+def position_sigmas(result: RunResult) -> Floats:
+    """Larger standard deviation of each pose's position, m, shape (t,)."""
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(result.covariances[:, :2, :2])[:, 1], 0.0)))
 
 
 def error_drawing(result: RunResult) -> Drawing:
@@ -104,10 +114,11 @@ def error_drawing(result: RunResult) -> Drawing:
         known = np.abs(error[np.isfinite(error)])
         limit = 1.25 * max(float(np.quantile(bound, 0.98)), float(np.quantile(known, 0.995)), 1e-6)
         offset = (0.0, sum(panel.outer[1] for panel in panels))
-        axes = Axes(_span(times), (-limit, limit), _WIDTH, 130.0, labels=("time (s)", name), offset=offset)
-        axes.band(times[at], -bound[at], bound[at])
+        unit = name[name.index("(") + 1 : -1]
+        axes = Axes(_span(times), (-limit, limit), _WIDTH, 130.0, labels=("time (s)", name), unit=unit, offset=offset)
+        axes.band(times[at], -bound[at], bound[at], name="±2σ")
         axes.rule(0.0)
-        axes.line(times[at], error[at], BLUE, 0.9)
+        axes.line(times[at], error[at], BLUE, 0.9, name="error")
         panels.append(axes)
     return drawing(panels)
 
@@ -118,8 +129,8 @@ def _span(times: Floats) -> tuple[float, float]:
 
 def _band(axes: Axes, times: Floats, values: Floats, colour: str) -> None:
     at, middle, low, high = pieces(times, values, _PIECES)
-    axes.band(at, low, high)
-    axes.line(at, middle, colour, 1.2)
+    axes.band(at, low, high, name="90 % within")
+    axes.line(at, middle, colour, 1.2, name="median")
 
 
 def pieces(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:

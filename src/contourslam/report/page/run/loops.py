@@ -7,6 +7,10 @@ from contourslam.report.page.run.values import RunValues, clock, count, degrees,
 from contourslam.slam.result import Loop
 
 _MOST = 30
+_GOOD = (
+    "A good loop has many pairs, a residual near the lidar's noise and a runner-up far below 1. A few pairs, or a "
+    "runner-up near 1, with a large shift: look at that place on the map first, for a wrong loop bends all of it."
+)
 _HEADERS = ("from → to (min)", "shift", "turn", "method", "pairs", "residual", "overlap", "runner-up")
 
 
@@ -28,7 +32,9 @@ def section(values: RunValues) -> Section | None:
     return Section(
         "loops",
         "Closed loops",
-        table(caption, _HEADERS, [_row(loop, values.begin) for loop in largest]) + paragraph(words, "note"),
+        paragraph(_GOOD)
+        + table(caption, _HEADERS, [_row(loop, values.begin) for loop in largest])
+        + paragraph(words, "note"),
     )
 
 

@@ -1,7 +1,7 @@
-"""How well scans and landmarks fitted, over time."""
+"""How well scans and landmarks fitted, and how sure of itself the estimate was, over time."""
 
-from contourslam.report.page.album import embedded
-from contourslam.report.page.markup import Section, figure
+from contourslam.report.page.album import drawn
+from contourslam.report.page.markup import Section, paragraph
 from contourslam.report.page.run.values import RunValues
 from contourslam.report.svg.series import matching_drawing
 
@@ -11,16 +11,23 @@ def section(values: RunValues) -> Section | None:
     quality, corrected = values.result.quality is not None, bool((values.result.nis_dof > 0).any())
     if not (quality or corrected):
         return None
-    said = []
+    good, said = [], []
     if quality:
+        good.append("Good matching stays near 1; where it falls for long, the scans saw little that they knew.")
         said.append("Quality: how well each scan's contours fitted the local map, 0 where nothing matched.")
     if corrected:
-        said.append(
-            "NIS: the innovation of the landmarks against what the filter expected; far above 1 it is too sure."
-        )
-    picture = embedded(
+        good.append("A good NIS scatters about 1; for long far above, the filter is too sure, far below, too cautious.")
+        said.append("NIS: the innovation of the landmarks against what the filter expected, per degree of freedom.")
+    good.append("The stated σ should fall where known places are seen again, and not grow without end.")
+    said.append("Position σ: the larger axis of what the estimate states of itself.")
+    figure = drawn(
         matching_drawing(values.result),
-        alt=" and ".join(["matching quality"] * quality + ["normalised innovation squared"] * corrected) + " over time",
+        kind="chart",
+        name="matching",
+        alt=", ".join(
+            ["matching quality"] * quality + ["normalised innovation squared"] * corrected + ["position sigma"]
+        )
+        + " over time",
         caption=" ".join([*said, "Lines are running medians, bands hold 90 % of the scans."]),
     )
-    return Section("matching", "Matching over time", figure(picture))
+    return Section("matching", "Matching over time", paragraph(" ".join(good)) + figure)

@@ -1,8 +1,13 @@
 """Where the computing time went."""
 
 from contourslam.evaluation.timing import timing
-from contourslam.report.page.markup import Cell, Row, Section, table
+from contourslam.report.page.markup import Cell, Row, Section, paragraph, table
 from contourslam.report.page.run.values import RunValues
+
+_WORDS = (
+    "All stages together must take well less than the lidar's period, 100 ms at 10 Hz, on the computer that drives; "
+    "one stage that takes most of it is where to look first."
+)
 
 
 def section(values: RunValues) -> Section | None:
@@ -15,7 +20,7 @@ def section(values: RunValues) -> Section | None:
     rows = [_row(stage, seconds, times.shares[stage], scans) for stage, seconds in times.seconds.items()]
     rows.append(_row("all together", times.total, 1.0, scans))
     numbers = table("CPU time per stage, after warm-up", ["stage", "s", "share", "ms per scan"], rows)
-    return Section("timings", "CPU time", numbers)
+    return Section("timings", "CPU time", paragraph(_WORDS) + numbers)
 
 
 def _row(stage: str, seconds: float, share: float, scans: int) -> Row:
