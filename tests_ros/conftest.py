@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -62,13 +63,15 @@ class Processes:
         self._running: list[subprocess.Popen[str]] = []
         self._plans: dict[str, Plan] = {}
 
-    def start(self, node: str, *, namespace: str = "", **parameters: object) -> "subprocess.Popen[str]":
-        """Start a node; ``__`` in a parameter's name stands for a dot."""
+    def start(
+        self, node: str, *, namespace: str = "", log: Path | None = None, **parameters: object
+    ) -> "subprocess.Popen[str]":
+        """Start a node; ``__`` in a parameter's name stands for a dot. What it says goes to `log`."""
         words = [sys.executable, "-m", f"contourslam_ros.{node}", "--ros-args"]
         words += ["-r", f"__ns:=/{namespace}"] if namespace else []
         for name, value in parameters.items():
             words += ["-p", f"{name.replace('__', '.')}:={str(value).lower() if isinstance(value, bool) else value}"]
-        return self._run(words)
+        return self._run(words, log)
 
     def play(self, **choices: Any) -> "subprocess.Popen[str]":
         """Play the recording as a :class:`Plan` says."""
@@ -82,8 +85,10 @@ class Processes:
         """Give what was added to the recording's stamps (`shift`, s), and how many `scans` were sent."""
         return self._plans[namespace].played()
 
-    def _run(self, words: list[str]) -> "subprocess.Popen[str]":
-        self._running.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, text=True))
+    def _run(self, words: list[str], log: Path | None = None) -> "subprocess.Popen[str]":
+        with ExitStack() as stack:
+            said = None if log is None else stack.enter_context(log.open("w"))
+            self._running.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=said, text=True))
         return self._running[-1]
 
     def end(self) -> None:

@@ -19,7 +19,7 @@ command -v c++ >/dev/null || {
 venv=$(realpath "$venv")
 # The wheels start every interpreter twice, to set this for it; done here, once is enough.
 pip() { "$venv/bin/python" -m pip install -qq --disable-pip-version-check --no-compile "$@"; }
-pip -r $here/requirements.txt --editable '.[graph,simulation,robot]'
+pip -r $here/requirements.txt --editable '.[graph,simulation,robot,view]'
 
 # The wheels' CMake files name the interpreter that they were built with.
 include=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')

@@ -44,6 +44,8 @@ def node_and_rviz(
             DeclareLaunchArgument("odom", default_value="odom", description="Topic of the wheels' odometry."),
             DeclareLaunchArgument("use_sim_time", default_value="false", description="Time comes from /clock."),
             DeclareLaunchArgument("rviz", default_value="false", description="Start RViz too."),
+            DeclareLaunchArgument("view_port", default_value="0", description="Port of the live page; 0 for none."),
+            DeclareLaunchArgument("view_host", default_value="127.0.0.1", description="Address to serve it at."),
             Node(
                 package="contourslam_ros",
                 executable=executable,
@@ -53,9 +55,12 @@ def node_and_rviz(
                     LaunchConfiguration("params_file"),
                     {
                         name: ParameterValue(LaunchConfiguration(name), value_type=str)
-                        for name in ("frame_prefix", "map_file", *texts)
+                        for name in ("frame_prefix", "map_file", "view_host", *texts)
                     }
-                    | {"use_sim_time": simulated},
+                    | {
+                        "use_sim_time": simulated,
+                        "view_port": ParameterValue(LaunchConfiguration("view_port"), value_type=int),
+                    },
                 ],
                 remappings=[("scan", LaunchConfiguration("scan")), ("odom", LaunchConfiguration("odom"))],
             ),

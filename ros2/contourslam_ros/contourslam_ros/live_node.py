@@ -3,6 +3,7 @@
 import tempfile
 import time
 from collections import OrderedDict, deque
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from contourslam.live.worker import Worker
 from contourslam.robot.config import load_robot
 from contourslam.robot.live_map import settings_of
 from contourslam.scan import LaserScan, Odometry
+from contourslam.view.followed import Followed
+from contourslam.view.serving import page_server
 from contourslam_ros.frames import SENT
 from contourslam_ros.grid_sender import GridSender
 from contourslam_ros.latency import Latencies
@@ -56,11 +59,14 @@ class LiveNode(Node):
     ----------
     rehearsed : tuple of str
         Stages of :mod:`contourslam.live.rehearsal` that the node may come to.
+    back_end : str or None
+        What the live page calls the work; None for that of the configuration.
     failure : BaseException or None
         Why the node cannot go on.
     """
 
     rehearsed: tuple[str, ...] = ()
+    back_end: str | None = None
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -76,6 +82,8 @@ class LiveNode(Node):
         # Of each scan, its stamp to the bit and when it came.
         self._arrived: OrderedDict[float, tuple[Time, int]] = OrderedDict()
         self._latencies = Latencies()
+        self._page: Followed | None = None
+        self._serving = ExitStack()
 
     def begin(self, mount: np.ndarray) -> Session:
         """Make the session, now that it is known where the lidar sits (``T_base_lidar``, shape (3,))."""
@@ -110,6 +118,8 @@ class LiveNode(Node):
         if self.config.publish_tf and self.config.odometry != "none":
             self.create_timer(self.config.tf_period, self._send_transform, clock=steady)
         Services(self, self.running, self.config.map_file)
+        if self.config.view_port:
+            self._serve_page()
         self._sensors.listen()
         self.get_logger().info(f"ready: waiting for {' and '.join(self.topics.values())}")
 
@@ -119,6 +129,7 @@ class LiveNode(Node):
             self._worker.stop()
             self._worker = self._session = None
             self._grid.close()
+        self._serving.close()
 
     def running(self) -> Session:
         """Give the session.
@@ -141,7 +152,10 @@ class LiveNode(Node):
             except ContourslamError as error:
                 self.failure = error
                 return
-            self._worker = Worker(self._session, self._on_done, clock=time.monotonic, failed=self._on_failure)
+            page = None if self._page is None else self._page.follow(self._session, self._sensors.mounting.pose)
+            self._worker = Worker(
+                self._session, self._on_done, clock=time.monotonic, failed=self._on_failure, onlooker=page
+            )
             self._worker.start()
             while self._early:
                 self._worker.push_odometry(self._early.popleft())
@@ -176,6 +190,17 @@ class LiveNode(Node):
     def _on_failure(self, error: BaseException) -> None:
         self.failure = error
 
+    def _serve_page(self) -> None:
+        name = self.get_fully_qualified_name().lstrip("/")
+        page = self._page = Followed(self.settings.core, title=name, back_end=self.back_end, health=self._missing)
+        server = page_server(page.show, page.lag, host=self.config.view_host, port=self.config.view_port)
+        self._serving.enter_context(server)
+        self.get_logger().info(f"the live page is at {server.url}")
+
+    def _missing(self) -> tuple[Diagnostic, ...]:
+        """Say what keeps the session from beginning; it tells the rest itself."""
+        return (Diagnostic(Level.WARN, "scans", self._sensors.trouble),) if self._session is None else ()
+
     def _send_transform(self) -> None:
         now = self.get_clock().now().nanoseconds
         correction = None if self._session is None else self._session.map_to_odom(now * 1e-9)
@@ -195,9 +220,8 @@ class LiveNode(Node):
             self._grid.send(self._session, self._sensors.mounting.pose)
 
     def _send_diagnostics(self) -> None:
-        if self._session is None:
-            told: tuple[Diagnostic, ...] = (Diagnostic(Level.WARN, "scans", self._sensors.trouble),)
-        else:
+        told = self._missing()
+        if self._session is not None:
             told = (*self._session.diagnostics(time.monotonic()), self._latencies.diagnostic())
         head = header(self.get_clock().now().to_msg(), "")
         self._diagnostics.publish(diagnostic_message(head, self.get_fully_qualified_name(), told))

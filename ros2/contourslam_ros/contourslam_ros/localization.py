@@ -19,6 +19,7 @@ class Localization(LiveNode):
     """The robot's pose in a known map, looked for everywhere until it is found."""
 
     rehearsed = "mapping, graph", "localising"  # the latter needs the map of the former
+    back_end = "localization"
 
     def __init__(self) -> None:
         super().__init__("localization")

@@ -59,6 +59,10 @@ class NodeConfig:
     """slam keeps its map here, saved by itself, and continues it where it is there; localization needs it."""
     robot: str = ""
     """The robot's file, robot.yaml: its lidar's range and its wheels' noise are then used, unless given here."""
+    view_port: int = 0
+    """Port at which the node serves the live page, for a browser (docs/view.md); 0 for no page."""
+    view_host: str = "127.0.0.1"
+    """Address to serve it at; 0.0.0.0 for the whole network: the link, which the node logs, then has a secret in it."""
 
     def __post_init__(self) -> None:
         if self.odometry not in ("topic", "tf", "none"):
@@ -66,6 +70,8 @@ class NodeConfig:
         for name in ("tf_period", "map_period", "grid_resolution", "ellipse_sigmas"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ConfigError(f"parameter {name} must be a positive number, got {getattr(self, name)!r}")
+        if not 0 <= self.view_port < 65536:
+            raise ConfigError(f"parameter view_port must lie between 0 and 65535, got {self.view_port!r}")
 
     def frame(self, name: str) -> str:
         """Put the prefix before one of the frames' names."""

@@ -10,7 +10,7 @@ import tyro
 
 from contourslam.cli.console import note
 from contourslam.cli.options import Flag
-from contourslam.errors import ConfigError, MissingExtraError
+from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
     from contourslam.config import Config
@@ -50,12 +50,9 @@ class Page:
         """
         if not 0 <= self.port < 65536:
             raise ConfigError(f"--{prefix}port must lie between 0 and 65535, got {self.port}")
-        try:
-            import websockets  # noqa: F401, whether it is there
-        except ModuleNotFoundError as error:
-            raise MissingExtraError(
-                "websockets serves the page and is not installed: pip install 'contourslam[view]'"
-            ) from error
+        from contourslam.view.serving import check_servable
+
+        check_servable()
 
     @contextmanager
     def served(self, show: "Show", lag: "Lag", say: Say = note) -> Iterator[None]:
@@ -73,13 +70,13 @@ class Page:
         ContourslamError
             If it cannot be served there.
         """
-        from contourslam.view.access import is_loopback, new_token
-        from contourslam.view.server import ViewServer
+        from contourslam.view.access import is_loopback
+        from contourslam.view.serving import page_server
 
-        token = "" if is_loopback(self.host) else new_token()
-        with ViewServer(show, host=self.host, port=self.port, token=token, lag=lag) as server:
+        with page_server(show, lag, host=self.host, port=self.port) as server:
             say(server.url)
-            note("open this page in a browser; Ctrl-C ends it" + (", others need the whole link" if token else ""))
+            others = "" if is_loopback(self.host) else ", others need the whole link"
+            note(f"open this page in a browser; Ctrl-C ends it{others}")
             if self.browser:
                 webbrowser.open(server.url)
             yield

@@ -87,4 +87,4 @@ class RobotHealth:
 
     def _camera(self) -> Diagnostic:
         number = self._counts.get("camera", 0)
-        return Diagnostic(Level.OK, "camera", f"{number} pictures" if number else "starting")
+        return Diagnostic(Level.OK, "camera", f"{number} picture{'s' * (number > 1)}" if number else "starting")
