@@ -7,7 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from contourslam.contour.contours import Floats
-from contourslam.view.rerun_file import STAMP, RerunFile
+from contourslam.view.rerun_file import SCAN, STAMP, RerunFile
 from contourslam.view.rerun_rows import turned
 
 CONTOURS = (
@@ -18,8 +18,8 @@ SHADES = (0x4B2F8AFF, 0x6A3FA0FF, 0x8F4AA8FF, 0xB4559FFF, 0xD5688CFF, 0xEE8375FF
 """Of a response, from none to the threshold and beyond."""
 LANES = (0x3D9BE9FF, 0xF0A030FF, 0x5CC26BFF, 0xB98CF0FF)
 TRUTH, RAW, LOOP, GOOD, BAD = 0x4CAF50FF, 0xC08457FF, 0xE86AB5FF, 0x3FBF6FFF, 0xF0625AFF
-WALL, CONVEX, CONCAVE, OLD, PALE = 0x9FB6CCFF, 0xF08A3CFF, 0xF4C542FF, 0x5B6875FF, 0x707C8AFF
-SLANT = 1.0  # m behind and above the robot, per metre of the scan that is shown
+WALL, CONVEX, CONCAVE, OLD, DIM, PALE = 0x9FB6CCFF, 0xF08A3CFF, 0xF4C542FF, 0x56616CFF, 0x35506BFF, 0x707C8AFF
+RING = rr.components.FillMode.MajorWireframe
 _BEGINNING = rrb.TimeRangeBoundary.infinite()
 _NOW = rrb.TimeRangeBoundary.cursor_relative()
 
@@ -40,20 +40,20 @@ def set_style(file: RerunFile, names: Sequence[str]) -> None:
     for number, name in enumerate(names):
         place, colour = f"world/{name}", LANES[number % len(LANES)]
         file.fix(f"{place}/trajectory", lines(colors=colour, radii=width(1.2)))
-        file.fix(f"{place}/uncertainty", ellipses(colors=colour, line_radii=width(1.0)))
+        file.fix(f"{place}/uncertainty", ellipses(colors=colour, line_radii=width(1.0), fill_mode=RING))
         arrow = np.array([[0.35, 0.0, 0.0], [-0.2, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.2, -0.2, 0.0], [0.35, 0.0, 0.0]])
         file.fix(f"{place}/robot/body", rr.LineStrips3D([arrow], colors=colour, radii=width(1.8)))
         file.fix(f"{place}/robot/lidar/scan", points(radii=width(2.0)))
         file.fix(f"{place}/look/response", points(radii=width(1.5)))
         file.fix(f"{place}/look/candidates", points(colors=BAD, radii=width(4.0)))
         file.fix(f"{place}/look/corners", points(colors=GOOD, radii=width(3.0)))
-        file.fix(f"{place}/look/associations", lines(radii=width(0.7)))
-        file.fix(f"{place}/map/corners", points(radii=width(3.0)))
-        file.fix(f"{place}/map/ellipses", ellipses(colors=CONVEX, line_radii=width(0.7)))
+        file.fix(f"{place}/look/associations", lines(radii=width(0.7), show_labels=False))
+        file.fix(f"{place}/map/corners", points(radii=width(3.0), show_labels=False))
+        file.fix(f"{place}/map/ellipses", ellipses(colors=CONVEX, line_radii=width(0.6), fill_mode=RING))
         file.fix(f"{place}/map/walls", lines(colors=WALL, radii=width(1.2)))
         file.fix(f"{place}/map/loops", lines(colors=LOOP, radii=width(0.7)))
         file.fix(f"{place}/final/walls", lines(colors=OLD, radii=width(0.6)))
-        file.fix(f"{place}/final/trajectory", lines(colors=PALE, radii=width(0.6)))
+        file.fix(f"{place}/final/trajectory", lines(colors=DIM, radii=width(0.5)))
         for what in ("nis", "sigma", "error"):
             file.fix(f"plots/{what}/{name}", rr.SeriesLines(colors=colour, names=name))
         bounds = rr.SeriesLines(colors=[PALE, PALE], names=["95 %, lower", "95 %, upper"])
@@ -96,7 +96,9 @@ def lay_out(file: RerunFile, names: Sequence[str], middle: Floats, half: float, 
 
 def _map_view(name: str, middle: Floats, half: float) -> rrb.Spatial3DView:
     x, y = (float(value) for value in middle)
-    so_far = rrb.VisibleTimeRanges(timeline=STAMP, start=_BEGINNING, end=_NOW)
+    so_far = rrb.VisibleTimeRanges(
+        [rrb.VisibleTimeRange(timeline, start=_BEGINNING, end=_NOW) for timeline in (STAMP, SCAN)]
+    )
     ways = (f"world/{name}/trajectory", "world/odometry", "world/truth")
     return rrb.Spatial3DView(
         origin="world",
