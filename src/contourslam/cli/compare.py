@@ -1,11 +1,15 @@
-"""``contourslam compare``: the paper's experiment, and its report."""
+"""``contourslam compare``: runs held against each other, or the paper's experiment; either with its report."""
 
 import os
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from contourslam.cli.console import Bar, chosen, complain, make_way, note, prepare_folder, print_json
+import tyro
+
+from contourslam.cli.console import Bar, chosen, complain, keep_apart, make_way, note, prepare_folder, print_json
+from contourslam.cli.evaluate import print_table
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Output, Overwrite, Settings
 from contourslam.config import Config
@@ -14,19 +18,32 @@ from contourslam.errors import ConfigError
 if TYPE_CHECKING:
     from contourslam.experiments.parallel import Observer
 
+_WITH_FOLDERS = {"--truth", "--relations", "--output", "--overwrite", "--json"}
 DETECTORS = ("matched_filter", "wu", "teh_chin", "curvature_scale_space")
 
 
 @dataclass(frozen=True)
 class Compare:
-    """Compare landmark detectors: drive through a room once per seed, replay each drive through every detector.
+    """Compare runs, or without any the landmark detectors in a simulated room.
 
-    Each detector runs with corners only, as in the paper, and with walls. The folder gets index.html (the report, opens
-    offline), its figures, metrics.json and the first drive's recording. Ctrl-C stops and reports what is done.
+    With result folders: what differs between the runs, their errors side by side, trajectories of the same recording
+    over one another, and how sure each difference is. The folder gets index.html (the report, opens offline), tables
+    as CSV and LaTeX, figures as SVG and PDF, and metrics.json. Only --truth, --relations, --output, --overwrite and
+    --json go with folders.
 
-    Example: contourslam compare --seeds 10 --jobs 2 -o out/comparison
+    Without folders: drives through a room once per seed and replays each drive through every detector, with corners
+    only, as in the paper, and with walls. The folder gets index.html, its figures, metrics.json and the first drive's
+    recording. Ctrl-C stops and reports what is done.
+
+    Example: contourslam compare out/ekf out/graph -o out/comparison
     """
 
+    folders: tyro.conf.Positional[tuple[Path, ...]] = ()
+    """Folders that `contourslam run` wrote, to be compared; the first one is what the others are laid upon."""
+    truth: Path | None = None
+    """True trajectory to judge the runs by: rows t x y z qx qy qz qw (TUM) or t x y theta."""
+    relations: Path | None = None
+    """Known relative poses to judge the runs by: rows t1 t2 dx dy dz roll pitch yaw."""
     output: Output = Path("comparison")
     overwrite: Overwrite = False
     room: str = "furnished_room"
@@ -49,6 +66,38 @@ class Compare:
     settings: Settings = field(default_factory=Config)
 
     def execute(self, command: str) -> int:
+        """Compare the runs, or run the experiments; write the report and print its table."""
+        given = {word.partition("=")[0].replace("_", "-") for word in shlex.split(command) if word.startswith("--")}
+        if self.folders:
+            if others := sorted(given - _WITH_FOLDERS):
+                raise ConfigError(
+                    f"{', '.join(others)}: of the simulated comparison, and not for result folders; leave it out, "
+                    "or the folders"
+                )
+            return self._runs(command)
+        if only := sorted(given & {"--truth", "--relations"}):
+            raise ConfigError(f"{', '.join(only)}: judges result folders; name those that are to be compared")
+        return self._detectors(command)
+
+    def _runs(self, command: str) -> int:
+        """Compare result folders."""
+        from contourslam.report.runs_page import write_runs_report
+        from contourslam.report.runs_reading import read_runs
+
+        keep_apart(self.output, self.folders)
+        runs = read_runs(self.folders, truth=self.truth, relations=self.relations)
+        prepare_folder(self.output, overwrite=self.overwrite)
+        for text in [text for run in runs for text in run.notes]:
+            note(text)
+        metrics = write_runs_report(self.output, runs, command=command)
+        if self.json:
+            print_json(metrics)
+        else:
+            print_table({run.name: run.metrics for run in runs})
+            print(f"\nreport: {self.output / 'index.html'}")
+        return 0
+
+    def _detectors(self, command: str) -> int:
         """Run the experiments, write the report and print Table I."""
         if self.seeds < 1 or self.jobs < 0:
             raise ConfigError("--seeds must be at least 1 and --jobs 0 or more")

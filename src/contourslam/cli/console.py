@@ -107,6 +107,18 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         raise ResultError(f"{folder} is not empty; choose another folder with --output, or replace with --overwrite")
 
 
+def keep_apart(output: Path, folders: Iterable[Path]) -> None:
+    """Refuse to write into a folder that is read.
+
+    Raises
+    ------
+    ConfigError
+        If the output folder is one of the others.
+    """
+    if output.resolve() in [folder.resolve() for folder in folders]:
+        raise ConfigError(f"{output} is one of the runs itself; choose another folder with --output")
+
+
 def make_way(path: Path, *, overwrite: bool) -> None:
     """Remove a file or a rosbag2 folder that is to be written anew.
 

@@ -1,12 +1,18 @@
 """The error of each known relative pose as a plain table."""
 
+import csv
+import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from contourslam.atomic import write_text
-from contourslam.evaluation.relations import JudgedRelations
+from contourslam.errors import ResultError
+from contourslam.evaluation.relations import JudgedRelations, RelationErrors
+from contourslam.nearest import unreadable
 
+RELATIONS = "relation_errors.csv"
 _WHO = (("", "estimate"), ("online_", "online"), ("odometry_", "odometry"))
 
 
@@ -28,3 +34,45 @@ def write_relation_table(path: Path, judged: JudgedRelations) -> None:
     for stamps, row in zip(judged.stamps.tolist(), np.stack(columns, axis=-1).tolist(), strict=True):
         lines.append(",".join([*map(repr, stamps), *(f"{value:.6g}" for value in row)]))
     write_text(path, "\n".join(lines) + "\n")
+
+
+def read_relation_table(path: Path, metrics: dict[str, Any]) -> JudgedRelations:
+    """Read the table back.
+
+    Parameters
+    ----------
+    path : Path
+    metrics : dict
+        ``metrics.json`` beside it, which says how many relations lie beyond the ends of the trajectory.
+
+    Raises
+    ------
+    ResultError
+        If the file cannot be read, or a line of it is not as it was written; the message names the line.
+    """
+    try:
+        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+    except OSError as error:
+        raise ResultError(unreadable(path, error)) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ResultError(f"{path}: is not a table of relations ({error})") from error
+    names = lines[0] if lines else []
+    known = [(prefix, field) for prefix, field in _WHO if f"{prefix}translation" in names]
+    expected = ["earlier_stamp", "later_stamp"]
+    expected += [f"{prefix}{part}" for prefix, _ in known for part in ("translation", "rotation")]
+    if names != expected or {"estimate", "odometry"} - {field for _, field in known}:
+        raise ResultError(
+            f"{path}: line 1 is not the header of a table of relations; write it again with `contourslam run`"
+        )
+    values = np.empty((len(lines) - 1, len(names)))
+    for number, line in enumerate(lines[1:]):
+        try:
+            values[number] = [float(field) for field in line]
+        except ValueError as error:
+            raise ResultError(f"{path}: line {number + 2} must hold {len(names)} numbers") from error
+    errors = {}
+    for at, (prefix, field) in enumerate(known):
+        told = metrics.get(f"{prefix}relations")
+        outside = told.get("outside", 0) if isinstance(told, dict) else 0
+        errors[field] = RelationErrors(values[:, 2 + 2 * at], values[:, 3 + 2 * at], int(outside))
+    return JudgedRelations(values[:, :2], errors["estimate"], errors.get("online"), errors["odometry"])

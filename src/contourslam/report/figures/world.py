@@ -62,7 +62,8 @@ def world_figure(
     return figure
 
 
-def _thinned(points: Floats) -> Floats:
+def thinned(points: Floats) -> Floats:
+    """Leave out points of a line that no one would see."""
     return points[:: max(1, len(points) // _MAX_POINTS)]
 
 
@@ -77,10 +78,10 @@ def _draw_room(axes: Axes, segments: Floats | None, circles: Floats | None) -> N
 
 
 def _draw_way(axes: Axes, result: RunResult) -> None:
-    axes.plot(*_thinned(result.odometry)[:, :2].T, color=ORANGE, linestyle=(0, (4, 2)), label="raw odometry", zorder=2)
+    axes.plot(*thinned(result.odometry)[:, :2].T, color=ORANGE, linestyle=(0, (4, 2)), label="raw odometry", zorder=2)
     if result.truth is not None:
-        axes.plot(*_thinned(result.truth)[:, :2].T, color=INK, linewidth=2.6, label="true path", zorder=2.1)
-    axes.plot(*_thinned(result.poses)[:, :2].T, color="#7cc4f0", linewidth=1.1, label="estimated path", zorder=2.2)
+        axes.plot(*thinned(result.truth)[:, :2].T, color=INK, linewidth=2.6, label="true path", zorder=2.1)
+    axes.plot(*thinned(result.poses)[:, :2].T, color="#7cc4f0", linewidth=1.1, label="estimated path", zorder=2.2)
     axes.plot(*result.poses[0, :2], marker="o", markersize=5, color=INK, zorder=2.3)
 
 
@@ -91,32 +92,53 @@ def draw_walls(axes: Axes, walls: WallMap) -> None:
         axes.add_collection(lines)
 
 
-def _enlargement(radius: float) -> int:
-    """Find a round factor that makes a typical ellipse of this radius (m) a quarter of a metre large, at most."""
-    return max((factor for factor in (1, 2, 5, 10, 20, 50) if factor * radius <= 0.25), default=1)
+def corner_ellipses(
+    axes: Axes, corners: CornerMap, *, largest: float = 0.25, width: float = 0.9
+) -> tuple[EllipseCollection, int]:
+    """Two-sigma ellipses of corners, enlarged by a round factor so that they can be seen.
+
+    Parameters
+    ----------
+    axes : Axes
+        In which they will be drawn.
+    corners : CornerMap
+        One or more.
+    largest : float
+        What a typical ellipse's half axis may become, m.
+    width : float
+        Of the lines, points.
+
+    Returns
+    -------
+    ellipses : EllipseCollection
+    enlarged : int
+        The factor.
+    """
+    variances, vectors = np.linalg.eigh(corners.covariances)
+    sigmas = np.sqrt(np.maximum(variances, 0.0))
+    radius = 2.0 * float(np.median(sigmas[:, 1]))
+    enlarged = max((factor for factor in (1, 2, 5, 10, 20, 50) if factor * radius <= largest), default=1)
+    widths = 4.0 * enlarged * sigmas
+    ellipses = EllipseCollection(
+        widths[:, 0],
+        widths[:, 1],
+        np.degrees(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])),
+        units="xy",
+        offsets=corners.positions,
+        offset_transform=axes.transData,
+        facecolors="none",
+        edgecolors=VERMILION,
+        linewidths=width,
+        zorder=4,
+    )
+    return ellipses, enlarged
 
 
 def draw_corners(axes: Axes, corners: CornerMap) -> None:
     """Draw the corners of a map, each with its two-sigma ellipse, enlarged so that it can be seen."""
     if not len(corners.ids):
         return
-    variances, vectors = np.linalg.eigh(corners.covariances)
-    sigmas = np.sqrt(np.maximum(variances, 0.0))
-    enlarged = _enlargement(2.0 * float(np.median(sigmas[:, 1])))
-    widths = 4.0 * enlarged * sigmas
-    angles = np.degrees(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0]))
-    ellipses = EllipseCollection(
-        widths[:, 0],
-        widths[:, 1],
-        angles,
-        units="xy",
-        offsets=corners.positions,
-        offset_transform=axes.transData,
-        facecolors="none",
-        edgecolors=VERMILION,
-        linewidths=0.9,
-        zorder=4,
-    )
+    ellipses, enlarged = corner_ellipses(axes, corners)
     axes.add_collection(ellipses)
     name = "2σ of a corner" + (f", {enlarged}× enlarged" if enlarged > 1 else "")
     axes.plot([], [], "o", markersize=9, markerfacecolor="none", markeredgecolor=VERMILION, label=name)

@@ -24,11 +24,12 @@ class Gallery:
 
     folder: Path
 
-    def add(self, name: str, figure: Figure, *, alt: str, caption: str) -> Picture:
-        """Save a figure and give it as a picture for the page."""
-        save_figure(figure, self.folder / "figures" / f"{name}.svg")
-        width, height = figure.get_size_inches() * 100.0
-        return Picture(f"figures/{name}.svg", round(width), round(height), alt, caption)
+    def add(self, name: str, figure: Figure, *, alt: str, caption: str, scale: float = 100.0) -> Picture:
+        """Save a figure as SVG and PDF, and give it as a picture for the page, so many px an inch large."""
+        save_figure(figure, *(self.folder / "figures" / f"{name}.{form}" for form in ("svg", "pdf")))
+        width, height = figure.get_size_inches() * scale
+        source = f"figures/{name}.svg"
+        return Picture(source, round(width), round(height), alt, caption, others=(source, f"figures/{name}.pdf"))
 
 
 def number(value: float | None, digits: int = 4) -> str:

@@ -39,7 +39,10 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture, with the words for those who cannot see it: a file beside the page, or the page's own (``data:``)."""
+    """A picture, with the words for those who cannot see it: a file beside the page, or the page's own (``data:``).
+
+    `others` are files of the same picture in other formats.
+    """
 
     source: str
     width: int
@@ -47,6 +50,7 @@ class Picture:
     alt: str
     caption: str
     chart: bool = True
+    others: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +107,10 @@ def figure(picture: Picture) -> str:
     )
     if not picture.source.startswith("data:"):  # browsers refuse to open these by themselves
         image = f'<a href="{source}">{image}</a>'
-    return f"<figure>{image}<figcaption>{escape(picture.caption)}</figcaption></figure>"
+    links = "".join(
+        f' <a href="{escape(other)}">{escape(other.rpartition(".")[2].upper())}</a>' for other in picture.others
+    )
+    return f"<figure>{image}<figcaption>{escape(picture.caption)}{links}</figcaption></figure>"
 
 
 def pair(pictures: Sequence[Picture]) -> str:
