@@ -179,9 +179,9 @@ def _runners_up(
         rival=0.2,
         keep=3,
     )
-    axes.plot(*points[:, :2].T, ".", color=FAINT, markersize=2)
+    axes.plot(*points[::3, :2].T, ".", color=FAINT, markersize=3)
     for hypothesis, shade in zip(found[::-1], (ORANGE, VERMILION, BLUE)[-len(found) :], strict=True):
-        axes.plot(*move(seen, hypothesis.pose)[:, :2].T, ".", color=shade, markersize=1.5)
+        axes.plot(*move(seen[::2], hypothesis.pose)[:, :2].T, ".", color=shade, markersize=2)
         draw_robot(axes, hypothesis.pose, shade, label=f"score {hypothesis.score:.2f}")
     handles, names = axes.get_legend_handles_labels()
     axes.legend(

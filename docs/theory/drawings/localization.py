@@ -53,10 +53,10 @@ def figure_places() -> Figure:
     for axes, room in zip(panes, ROOMS, strict=True):
         view, there = seen(room), known(room)
         found = Locator(there).locate(view)
-        axes.plot(*there.points[:, :2].T, ".", color=FAINT, markersize=4)
+        axes.plot(*there.points[::2, :2].T, ".", color=FAINT, markersize=5)
         poses = [(found.pose, found.probability), *((r.pose, r.probability) for r in found.runners_up)]
         for (pose, probability), shade in zip(poses, (BLUE, ORANGE, VERMILION), strict=False):
-            axes.plot(*move(view, pose)[:, :2].T, ".", color=shade, markersize=1.5)
+            axes.plot(*move(view[::2], pose)[:, :2].T, ".", color=shade, markersize=2)
             draw_robot(axes, pose, shade, label=f"probability {probability:.2f}")
         axes.set(xlabel=f"x (m), {room}", aspect="equal")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, handletextpad=0.1, columnspacing=0.8)

@@ -37,7 +37,7 @@ def sighting(
 @styled
 def figure_motion() -> Figure:
     """The printed step against an arc, and a cloud of end poses against the ellipse of the prediction."""
-    figure = Figure(figsize=(7.6, 2.7), layout="constrained")
+    figure = Figure(figsize=(7.4, 3.3), layout="constrained")
     steps, cloud = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
     way = np.array([arc(0.5 * t, 0.8 * t) for t in np.linspace(0.0, 2.0, 50)])
     steps.plot(*way[:, :2].T, color=FAINT, linewidth=6.0, label="arc of a circle")
@@ -47,7 +47,7 @@ def figure_motion() -> Figure:
             poses.append(unicycle_step(poses[-1], 0.5, 0.8, dt))
         steps.plot(*np.array(poses)[:, :2].T, ".-", color=shade, label=f"(28), dt = {dt} s")
     steps.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    steps.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    steps.legend(loc="lower left", bbox_to_anchor=(-0.2, 1.0), ncols=2, columnspacing=0.8)
     chance, config, increment = np.random.default_rng(0), MotionConfig(), np.array([0.2, 0.0, 0.04])
     noise = motion_noise(increment, config)
     mean, covariance = np.zeros(3), 1e-10 * np.eye(3)
@@ -61,7 +61,7 @@ def figure_motion() -> Figure:
     draw_ellipse(cloud, mean[:2], ekf.symmetric(covariance, 3)[:2, :2], VERMILION)
     cloud.plot([], [], color=VERMILION, label="stated, 2σ")
     cloud.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    cloud.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=4.0)
+    cloud.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, columnspacing=0.8, markerscale=4.0)
     return figure
 
 
