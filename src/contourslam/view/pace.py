@@ -11,6 +11,7 @@ LONGEST_GAP = 10.0  # s in the recording; longer ones are passed over
 BEHIND = 0.5  # s; one who is later than this does not try to make up for it
 WINDOW = 3.0  # s over which the speed that is reached is told
 NAP = 0.1  # s
+ARRIVING = 8.0  # s in the recording
 
 
 class Pace:
@@ -140,6 +141,10 @@ class Pace:
                 continue
             with self._changed:
                 self._changed.wait(min(left, NAP))
+
+    def arrives(self, elapsed: float) -> bool:
+        """Whether it goes as fast as it can, and is about to be where it was to go."""
+        return 0.0 <= self._hurry - elapsed < ARRIVING
 
     def rest(self) -> None:
         """Note that nothing more is to be mapped."""

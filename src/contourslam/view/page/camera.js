@@ -77,7 +77,7 @@ export class Camera {
   fit(box, width, height) {
     const [x0, y0, x1, y1] = box;
     if (!(x1 > x0)) return;
-    const scale = Math.min(0.86 * width / Math.max(x1 - x0, 4), 0.84 * height / Math.max(y1 - y0, 4));
+    const scale = Math.min(0.86 * width / Math.max(x1 - x0, 4), 0.82 * height / Math.max(y1 - y0, 4));
     const [x, y] = [(x0 + x1) / 2, (y0 + y1) / 2];
     const off = Math.hypot(x - this.x, y - this.y) * this.scale;
     if (scale < this.scale || scale > 1.5 * this.scale || off > 0.1 * width) {

@@ -94,6 +94,7 @@ function draw(now) {
   if (now - panelsAt > PANELS) {
     panelsAt = now;
     drawPanels(model, selected);
+    for (const map of maps) map.describe(model);
   } else {
     panelsWait ??= setTimeout(() => { panelsWait = null; ask(); }, PANELS + 5 - (now - panelsAt));
   }
@@ -112,15 +113,34 @@ function waiting() {
   if (lost) $("waiting").textContent = "The robot is not found in the map yet: drive it to where it sees walls and corners.";
 }
 
+/** What the lines on the map are, of those that are shown. */
 function legend() {
-  const lift = maps[0].lift, large = lift > 1 ? `, drawn ${lift} times larger` : "";
-  const line = layers.corners ? `Corner ellipses: 3σ${large} · robot: 3σ` : "Robot: 3σ";
-  if ($("legend").textContent !== line) $("legend").textContent = line;
+  const { lift } = maps[0], truth = Boolean(model.frame.truth), loops = model.maps.some((map) => map && map.loop_methods.length);
+  const entries = [
+    [layers.walls, "line", "wall", "walls"],
+    [layers.corners, "ring", "corner", `corners, 3σ${lift > 1 ? `, ${lift} times larger` : ""}`],
+    [layers.path, "line", "lane0", "trajectory"],
+    [layers.truth && truth, "dash", "truth", "true trajectory"],
+    [layers.odometry, "line", "raw", "raw odometry"],
+    [layers.loops && loops, "line", "loop", "ties to earlier places"],
+    [layers.pairs, "line", "good", "recognised now"],
+    [layers.response, "line", "bad", "detector response"],
+  ].filter(([on]) => on);
+  const key = entries.map(([, , , words]) => words).join();
+  if ($("legend").dataset.key === key) return;
+  $("legend").dataset.key = key;
+  $("legend").replaceChildren(...entries.map(([, kind, tint, words]) => {
+    const entry = document.createElement("li"), sign = document.createElement("i");
+    sign.className = kind;
+    sign.style.setProperty("--c", `var(--${tint})`);
+    entry.append(sign, words);
+    return entry;
+  }));
 }
 
-/** A tap on a map: the corner there, or none. */
-function choose(lane, point) {
-  const id = maps[lane].cornerAt(model, point);
+/** A tap on a map: the corner there, or none; `reach` is how far away it may be, in pixels. */
+function choose(lane, point, reach) {
+  const id = maps[lane].cornerAt(model, point, reach);
   select(id < 0 ? null : { lane, id });
 }
 
@@ -188,9 +208,21 @@ $("goto").onchange = () => {
   select({ lane, id });
 };
 
+/** A key while a map has the focus: true where it means something there. */
+function keyOnMap(lane, key) {
+  const step = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] }[key];
+  if (step) camera.shift(...step);
+  else if (key === "Enter") choose(lane, [0, 0], Infinity);
+  return Boolean(step) || key === "Enter";
+}
+
 document.addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === " " && event.target.closest("button, summary")) return;
+  if (event.target.dataset.lane !== undefined && keyOnMap(Number(event.target.dataset.lane), event.key)) {
+    event.preventDefault();
+    return;
+  }
   const keys = {
     " ": () => transport.toggle(),
     ArrowLeft: () => send("step", event.shiftKey ? -10 : -1),

@@ -32,12 +32,15 @@ export class LaneMap {
     this.figure = document.createElement("figure");
     this.figure.className = "lane";
     this.canvas = document.createElement("canvas");
-    this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", `Map by ${name}`);
+    this.canvas.setAttribute("role", "application");
+    this.canvas.setAttribute("aria-roledescription", "map");
+    this.canvas.setAttribute("aria-label", `Map by ${name.replaceAll("_", " ")}`);
+    this.canvas.tabIndex = 0;
     this.canvas.dataset.lane = lane;
     const caption = document.createElement("figcaption");
     const title = document.createElement("b");
     title.textContent = name.replaceAll("_", " ");
+    title.style.setProperty("--c", `var(--lane${lane})`);
     this.facts = document.createElement("span");
     caption.append(title, this.facts);
     this.figure.append(caption, this.canvas);
@@ -87,12 +90,23 @@ export class LaneMap {
     return (px, py) => [ox + cm * px - sm * py, oy + sm * px + cm * py];
   }
 
-  /** Nearest corner to a point of the canvas (pixels from its middle); -1 where there is none. */
-  cornerAt(model, [px, py]) {
+  /** What the map shows, in words, for those who do not see it. */
+  describe(model) {
+    const { pose: [x, y, a], covariance: [xx, , yy, , , tt] } = model.frame.lanes[this.lane], degrees = 180 / Math.PI;
+    const sigma = (100 * Math.sqrt(xx + yy)).toFixed(1);
+    const words = `Map by ${this.name.replaceAll("_", " ")}: ${this.facts.textContent || "nothing drawn yet"}; robot at `
+      + `${x.toFixed(2)}, ${y.toFixed(2)} m, heading ${(a * degrees).toFixed(0)}°, known to ${sigma} cm and `
+      + `${(Math.sqrt(tt) * degrees).toFixed(2)}°. Arrow keys move the map, plus and minus zoom, Enter opens the corner `
+      + "nearest to its middle.";
+    this.canvas.setAttribute("aria-label", words);
+  }
+
+  /** Nearest corner to a point of the canvas (pixels from its middle), no farther than `reach`; -1 where there is none. */
+  cornerAt(model, [px, py], reach = 18) {
     const map = model.maps[this.lane];
     if (!map) return -1;
     const x = this.camera.x + px / this.camera.scale, y = this.camera.y - py / this.camera.scale;
-    let best = 18 / this.camera.scale, found = -1;
+    let best = reach / this.camera.scale, found = -1;
     for (let i = 0; i < map.corner_ids.length; i++) {
       const apart = Math.hypot(map.corners[2 * i] - x, map.corners[2 * i + 1] - y);
       if (apart < best) { best = apart; found = map.corner_ids[i]; }
@@ -123,7 +137,8 @@ export class LaneMap {
     const { scale } = camera;
     this.sx = (x) => (x - camera.x) * scale;
     this.sy = (y) => -(y - camera.y) * scale;
-    drawScaleBar(this, width, height);
+    // One is enough; below it stand the legend, or a phone's buttons.
+    if (this.lane === 0) drawScaleBar(this, width, height, model.lanes > 2 ? 14 : width < 480 ? 62 : 40);
     if (layers.odometry) drawLine(this, model.track(1), colour("raw"), 1.2);
     if (map && layers.loops) drawLoops(this, map);
     if (layers.path) drawPath(this, model, frame);

@@ -64,10 +64,11 @@ export function drawScan(canvas, frame, mount) {
 
 /** Response of each detector along the contours, in units of its threshold. */
 export function drawResponse(canvas, frame) {
+  canvas.style.height = `${78 + 42 * frame.lanes.length}px`;
   const area = begin(canvas);
   if (!area) return;
   const { ctx, width, height } = area, left = 4, right = width - 4, rows = frame.lanes.length;
-  const tall = (height - 14) / rows;
+  const tall = (height - 18) / rows;
   frame.lanes.forEach((lane, number) => {
     const { response, curve_starts: starts, candidates, threshold } = lane, n = Math.max(response.length, 2);
     const base = 2 + tall * (number + 1) - 3, high = (tall - 6) / 2.6;

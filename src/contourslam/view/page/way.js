@@ -96,10 +96,10 @@ export function drawFlashes(view) {
   return view.flashes.length > 0;
 }
 
-export function drawScaleBar(view, width, height) {
+export function drawScaleBar(view, width, height, bottom) {
   const { ctx, camera } = view, most = Math.min(140, width / 3);
   const metres = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200].findLast((m) => m * camera.scale <= most) || 0.1;
-  const long = metres * camera.scale, x = -width / 2 + 14, y = height / 2 - (width < 480 ? 62 : 40);
+  const long = metres * camera.scale, x = -width / 2 + 14, y = height / 2 - bottom;
   ctx.strokeStyle = ctx.fillStyle = colour("muted");
   ctx.lineWidth = 1.5;
   ctx.beginPath();
