@@ -1,18 +1,27 @@
 """A live session that is watched, on a clock of its own."""
 
+import json
+import time
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from websockets.sync.client import connect
 
-from contourslam.config import Config, LiveConfig
+from contourslam.config import Config, LiveConfig, SlamConfig
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.live.start import localization, mapping
+from contourslam.live.worker import Worker
 from contourslam.replay import replay
+from contourslam.scan import LaserScan, Odometry
+from contourslam.view.followed import Followed
 from contourslam.view.health import PERIOD, Health
 from contourslam.view.memory import Memory
+from contourslam.view.server import ViewServer
 
+SETTINGS = Config(back_end="ekf", slam=SlamConfig(walls=True, contour_matching=True))
 GRAPH = pytest.mark.skipif(find_spec("gtsam") is None, reason="no GTSAM")
 BACK_ENDS = ["ekf", pytest.param("graph", marks=GRAPH)]
 
@@ -166,3 +175,39 @@ def test_over_hours_what_is_kept_stays_within_its_bounds(live) -> None:
     assert memory._bytes <= 200_000 and memory._map_bytes <= 40_000 and len(memory.knots(0)) <= 20
     assert memory.at(0.0).elapsed < 2.0 and memory.newest.index == 399
     assert robot.followed.show.status()["scans"] == 400
+
+
+def test_a_page_that_stops_reading_costs_the_mapping_nothing(drive) -> None:
+    followed = Followed(SETTINGS, title="robot")
+    session = mapping(SETTINGS, LiveConfig(max_waiting=1000), clock=time.monotonic)
+    followed.follow(session, np.zeros(3))
+    done: list[float] = []
+    failed: list[BaseException] = []
+    worker = Worker(
+        session, lambda p: done.append(p.stamp), clock=time.monotonic, failed=failed.append, onlooker=followed
+    )
+    with ViewServer(followed.show, lag=followed.lag) as server, ExitStack() as stack:
+        url = server.url.replace("http:", "ws:") + "ws"
+        asleep = stack.enter_context(connect(url, max_size=None, max_queue=1, close_timeout=0.2))
+        awake = stack.enter_context(connect(url, max_size=None))
+        asleep.recv(timeout=60)  # and never again
+        worker.start()
+        for message in drive(300):
+            if isinstance(message, LaserScan):
+                worker.push_scan(message)
+            elif isinstance(message, Odometry):
+                worker.push_odometry(message)
+        kinds: set[str] = set()
+        while not ({"frame", "map"} <= kinds and len(done) == 300):
+            head = read(awake.recv(timeout=60))
+            kinds.add(head["kind"])
+            if head["kind"] == "frame":
+                awake.send(json.dumps({"do": "drawn", "value": head["index"]}))
+        assert followed.lag.pages == 2
+        worker.stop()
+    assert failed == [] and followed.error is None
+    assert followed.show.status()["scans"] == 300
+
+
+def read(message: bytes) -> dict:
+    return json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
