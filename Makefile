@@ -29,7 +29,7 @@ docs: $(VENV)/.docs ## Build the documentation site into site/.
 	@echo "Open site/index.html in a browser; $(BIN)/mkdocs serve makes its search work too."
 
 test-docs: $(VENV)/.dev $(VENV)/.docs ## Test the site, and every command in the documents; minutes.
-	$(BIN)/python -m pytest -n auto --dist worksteal tests_docs
+	$(BIN)/python -m pytest -n auto --dist loadgroup tests_docs
 
 test-ros: $(VENV_ROS)/.ready ## Run the ROS 2 nodes against real rclpy, in an environment of its own (needs a C++ compiler).
 	$(VENV_ROS)/bin/python -m pytest tests_ros

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from links import ROOT, rewritten
+from links import ROOT, rewritten, with_names_linked
 from mathml import with_mathml
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -36,8 +36,9 @@ def _made() -> Iterator[tuple[str, str | bytes]]:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Lead links to where their targets are on the site."""
-    return rewritten(markdown, page.file.src_uri)
+    """Lead links and names to where their targets are on the site."""
+    uri = page.file.src_uri
+    return with_names_linked(rewritten(markdown, uri), uri)
 
 
 def on_page_content(html: str, **_: Any) -> str:

@@ -106,5 +106,24 @@ def rewritten(markdown: str, page: str) -> str:
     return outside_of_code(markdown, lambda text: _TARGET.sub(lead, text))
 
 
+_FULL_NAME = re.compile(r"(?<![\[`])`(contourslam\.[a-z_]+(?:\.[A-Za-z_]\w*)*)`(?!\])")
+_NAME = re.compile(r"(?<![\[`])`([a-z_]+\.[A-Za-z_.]+)`(?!\])")
+
+
+def with_names_linked(markdown: str, page: str) -> str:
+    """Lead each full name of something in the package to its place in the reference, where it has one."""
+    markdown = outside_of_code(markdown, lambda text: _FULL_NAME.sub(lambda name: _linked(name[1], name[1]), text))
+    if page == "paper.md":  # where all names are below the package
+        below = outside_of_code(
+            markdown, lambda text: _NAME.sub(lambda name: _linked(f"contourslam.{name[1]}", name[1]), text)
+        )
+        return below
+    return markdown
+
+
+def _linked(identifier: str, text: str) -> str:
+    return f'<autoref identifier="{identifier}" optional><code>{text}</code></autoref>'
+
+
 def _in_repository(target: str, page: str) -> str:
     return posixpath.normpath(posixpath.join(posixpath.dirname(place_in_repository(page)), target))

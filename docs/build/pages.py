@@ -31,7 +31,8 @@ def rooms() -> dict[str, str]:
 
 def reference() -> Iterator[tuple[str, str]]:
     """One page for each of them, and a list."""
-    lines = ["# Reference", "", "Generated from the docstrings.", "", "| module | what |", "|---|---|"]
+    whole = "::: contourslam\n    options: {show_submodules: false}"
+    lines = ["# Reference", "", whole, "", "| module | what |", "|---|---|"]
     for name, summary in rooms().items():
         lines.append(f"| [`{name}`]({name}.md) | {summary} |")
         yield f"reference/{name}.md", _room_page(name)
@@ -44,7 +45,7 @@ def _room_page(name: str) -> str:
     inner = [f"{name}.{path.stem}" for path in modules if not path.stem.startswith("_")]
     parts = [
         f"# {name}",
-        f"::: {name}\n    options: {{show_submodules: false, members: []}}" if inner else f"::: {name}",
+        f"::: {name}\n    options: {{show_submodules: false}}" if inner else f"::: {name}",
     ]
     for module in inner:
         parts += [f"::: {module}\n    options: {{show_root_heading: true, show_root_toc_entry: true}}"]
