@@ -76,13 +76,12 @@ def test_every_name_on_a_page_exists(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_block_prints_what_the_page_shows(page: Path) -> None:
-    scope = {"__name__": page.stem}
     blocks = BLOCK.findall(page.read_text())
     assert blocks
     for code, shown in blocks:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
-            exec(compile(code, str(page), "exec"), scope)
+            exec(compile(code, str(page), "exec"), {"__name__": page.stem})
         assert printed.getvalue() == shown
 
 
