@@ -36,7 +36,7 @@ def test_runs_of_a_recording_are_compared_by_relations_they_are_given(
     assert recording["apart"]["again"]["position"]["max"] < 1e-12
     assert (out / "index.html").is_file()
     assert {path.stem for path in (out / "figures").glob("*.pdf")} == {
-        "trajectories", "differences", "maps", "relation_errors",
+        "trajectories", "differences", "maps", "relation_errors", "relation_turns",
     }  # fmt: skip
 
 

@@ -163,7 +163,7 @@ def test_relations_that_a_folder_has_lost_are_missed_aloud(folders, tmp_path, ma
 
 def test_the_page_has_its_sections_and_marks_what_is_incomplete(report, parsed) -> None:
     text = (report / "index.html").read_text()
-    assert re.findall(r'<h2 id="([\w-]+)">', text) == ["measures", "settings", "together_1", "reproduce"]
+    assert re.findall(r'<h2 id="([\w-]+)">', text) == ["settings", "measures", "together_1", "reproduce"]
     assert "INCOMPLETE: c stopped early." in text
     assert "contourslam compare &lt;&amp;&gt;" in text
     page = parsed(text)
@@ -186,7 +186,7 @@ def test_only_runs_of_the_whole_recording_compete_for_the_best(report, folders) 
     assert first < second
     assert f'<td class="better">{first:.4f}</td><td>{second:.4f}</td><td>' in text
     alone = rows(report / "tables" / "measures_2.csv")
-    part = text[text.index("Runs of yard.bag") : text.index('id="settings"')]
+    part = text[text.index("Runs of yard.bag") : text.index("Each setting over its recordings")]
     assert alone[""] == ["d"]
     assert 'class="better"' not in part
 
@@ -247,7 +247,7 @@ def test_figures_for_a_paper_embed_their_fonts_and_are_as_wide_as_asked(folders,
         save_figure(figure, tmp_path / f"{name}.pdf", tmp_path / f"{name}.svg")
         assert not any(axes.get_title() for axes in figure.axes), name
     pdfs = sorted(tmp_path.glob("*.pdf"))
-    assert [path.stem for path in pdfs] == ["map", "nis", "relation_errors", "relations"]
+    assert [path.stem for path in pdfs] == ["map", "nis", "relation_errors", "relation_turns", "relations"]
     for path in pdfs:
         text = path.read_bytes()
         assert b"/FontFile2" in text  # TrueType, in the file
@@ -268,7 +268,7 @@ def test_the_same_run_gives_the_same_bytes_in_another_process(folders, tmp_path)
     command = [sys.executable, "-c", code, "figures", str(folders[0]), "-o", str(two)]
     subprocess.run(command, check=True, capture_output=True, env={"PYTHONHASHSEED": "7"})
     files = sorted(path.name for path in one.iterdir())
-    assert len(files) == 8
+    assert len(files) == 10
     for name in files:
         assert (one / name).read_bytes() == (two / name).read_bytes(), name
 

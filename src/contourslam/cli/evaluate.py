@@ -51,6 +51,6 @@ def print_table(metrics: dict[str, dict[str, Any]]) -> None:
     width = max(12, *(len(name) for name in metrics))
     print(" " * 48 + "".join(f"{name:>{width + 2}}" for name in metrics))
     for measure in MEASURES:
-        cells = [measure.text(measure.value(run)) for run in metrics.values()]
+        cells = [measure.text(value) for value in measure.values(metrics.values())]
         if any(cells):
             print(f"{measure.name:<48}" + "".join(f"{cell or '-':>{width + 2}}" for cell in cells))

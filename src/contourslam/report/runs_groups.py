@@ -76,15 +76,19 @@ class Group:
     motions: tuple[Floats, ...]
 
     @property
-    def competing(self) -> frozenset[str]:
-        """Names of the runs that have done all of the recording, where there are two or more of them."""
+    def whole(self) -> frozenset[str]:
+        """Names of the runs that are complete and cover the recording as far as any of them."""
         times = [float(np.ptp(run.result.stamps)) for run in self.runs]
-        names = frozenset(
+        return frozenset(
             run.name
             for run, time in zip(self.runs, times, strict=True)
             if run.result.complete and time >= _WHOLE * max(times)
         )
-        return names if len(names) > 1 else frozenset()
+
+    @property
+    def competing(self) -> frozenset[str]:
+        """Names of the whole runs, where there are two or more: only they can be better or worse than each other."""
+        return self.whole if len(self.whole) > 1 else frozenset()
 
     def moved(self, at: int) -> Floats:
         """Poses of a run in the first one's world, shape (t, 3)."""
@@ -103,7 +107,8 @@ class Group:
 
     def pairs(self) -> list[Pair]:
         """Every two runs that compete, by everything that both were judged by."""
-        competing = [run for run in self.runs if run.name in self.competing]
+        names = self.competing
+        competing = [run for run in self.runs if run.name in names]
         return [pair for one, other in combinations(competing, 2) for pair in _pairs(one, other)]
 
 

@@ -18,6 +18,7 @@ from contourslam.report.page.runs.values import RunsReport, differing
 from contourslam.report.result_folder import to_json
 from contourslam.report.runs_groups import Group, grouped
 from contourslam.report.runs_reading import JudgedRun
+from contourslam.report.runs_rows import MEASURES
 
 
 def write_runs_report(folder: Path, runs: Sequence[JudgedRun], *, command: str = "") -> dict[str, Any]:
@@ -53,8 +54,8 @@ def write_runs_report(folder: Path, runs: Sequence[JudgedRun], *, command: str =
                 remove(path)
     write_text(folder / "metrics.json", to_json(metrics))
     parts = [
-        measures.section(report),
         differs.section(report),
+        measures.section(report),
         *(recording.section(report, group) for group in report.groups),
         reproduce.section(report),
     ]
@@ -115,9 +116,21 @@ def _group_metrics(group: Group) -> dict[str, Any]:
 
 
 def _lead(report: RunsReport) -> str:
+    """Say what is compared, and, of one recording, which run has the smallest errors."""
     runs, groups = report.runs, report.groups
-    if len(groups) == 1:
-        drive = f"{groups[0].recording}, {max(run.distance for run in runs):,.0f} m"
-        return f"{len(runs)} run{'s' * (len(runs) > 1)} of one recording ({drive})."
-    names = ", ".join(f"{len(group.runs)} of {group.recording}" for group in groups)
-    return f"{len(runs)} runs of {len(groups)} recordings: {names}. Errors are compared within a recording only."
+    if len(groups) > 1:
+        names = ", ".join(f"{len(group.runs)} of {group.recording}" for group in groups)
+        return f"{len(runs)} runs of {len(groups)} recordings: {names}. Errors are compared within a recording only."
+    drive = f"{groups[0].recording}, {max(run.distance for run in runs):,.0f} m"
+    said = f"{len(runs)} run{'s' * (len(runs) > 1)} of one recording ({drive})."
+    for measure in (measure for measure in MEASURES if measure.smaller_wins and measure.unit == "m"):
+        known = [
+            (value, run.name)
+            for run, value in zip(runs, measure.values(run.metrics for run in runs), strict=True)
+            if run.name in groups[0].competing and value is not None
+        ]
+        if len({measure.text(value) for value, _ in known}) > 1:
+            (least, best), (most, worst) = min(known), max(known)
+            said += f" {measure.title[0].upper()}{measure.title[1:]}: from {measure.text(least)} m ({best}) "
+            return said + f"to {measure.text(most)} m ({worst}); how sure that is, stands below."
+    return said

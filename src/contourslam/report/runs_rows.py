@@ -1,6 +1,7 @@
 """What is told of a run when it stands beside others, in words and numbers: on the terminal and on the page alike."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,9 @@ class Measure:
         Decimals.
     smaller_wins : bool
         Whether the smallest one is the best; else there is none.
+    else_keys : tuple of str
+        Where to look for runs that have no such value, if others have one: the poses of a run that revises nothing are
+        those known at the time.
     """
 
     title: str
@@ -26,17 +30,20 @@ class Measure:
     keys: tuple[str, ...]
     digits: int = 0
     smaller_wins: bool = False
+    else_keys: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """Title with unit."""
         return self.title + (f", {self.unit}" if self.unit else "")
 
-    def value(self, metrics: dict[str, Any]) -> Any:
-        """Look it up; None where it is not known."""
-        found: Any = metrics
-        for key in self.keys:
-            found = found.get(key) if isinstance(found, dict) else None
+    def values(self, metrics: Iterable[dict[str, Any]]) -> list[Any]:
+        """Look it up in each run's metrics; None where it is not known."""
+        runs = list(metrics)
+        found = [_at(run, self.keys) for run in runs]
+        if self.else_keys and any(value is not None for value in found):
+            others = (_at(run, self.else_keys) for run in runs)
+            found = [other if value is None else value for value, other in zip(found, others, strict=True)]
         return found
 
     def text(self, value: Any) -> str:
@@ -52,11 +59,28 @@ class Measure:
         return math.degrees(value) if self.unit == "deg" else value
 
 
-def _relations(prefix: str, keys: str) -> tuple[Measure, ...]:
-    return (
-        Measure(f"{prefix}relation error, mean", "m", (keys, "translation", "mean"), 4, True),
-        Measure(f"{prefix}relation error, median", "m", (keys, "translation", "median"), 4, True),
-        Measure(f"{prefix}relation error, rotation, mean", "deg", (keys, "rotation", "mean"), 3, True),
+def _at(metrics: dict[str, Any], keys: tuple[str, ...]) -> Any:
+    found: Any = metrics
+    for key in keys:
+        found = found.get(key) if isinstance(found, dict) else None
+    return found
+
+
+def _relations(prefix: str, keys: str, others: str = "") -> tuple[Measure, ...]:
+    return tuple(
+        Measure(
+            f"{prefix}relation error, {name}",
+            unit,
+            (keys, part, kind),
+            digits,
+            True,
+            (others, part, kind) if others else (),
+        )
+        for name, unit, part, kind, digits in (
+            ("mean", "m", "translation", "mean", 4),
+            ("median", "m", "translation", "median", 4),
+            ("rotation, mean", "deg", "rotation", "mean", 3),
+        )
     )
 
 
@@ -68,7 +92,7 @@ MEASURES = (
     Measure("absolute trajectory error, RMS", "m", ("ate", "rmse"), 4, True),
     Measure("relative trajectory error, RMS per m", "m", ("rpe", "rmse"), 4, True),
     *_relations("", "relations"),
-    *_relations("online ", "online_relations"),
+    *_relations("online ", "online_relations", "relations"),
     Measure("raw odometry's relation error, mean", "m", ("odometry_relations", "translation", "mean"), 4),
     Measure("raw odometry's rel. error, rotation, mean", "deg", ("odometry_relations", "rotation", "mean"), 3),
     Measure("pose NEES (ideal 3)", "", ("nees",), 2),

@@ -66,6 +66,11 @@ def _of_group(group: Group, width: float) -> Iterator[tuple[str, Figure]]:
     positions = {run.name: errors for run in group.runs if (errors := run.position_errors) is not None}
     if relations:
         yield "relation_errors", distribution_figure(relations, xlabel="relation error (m)", width=width)
+        turns = {
+            run.name: np.degrees(run.relations.estimate.rotation) for run in group.runs if run.relations is not None
+        }
+        label = "relation error, rotation (°)"
+        yield "relation_turns", distribution_figure(turns, xlabel=label, least=1e-3, width=width)
     if positions:
         yield "position_errors", distribution_figure(positions, xlabel="position error (m)", width=width)
     if len(group.runs) > 1:

@@ -38,10 +38,12 @@ def differences_figure(differences: Mapping[str, tuple[Floats, Floats, Floats]],
     """
     figure = Figure(figsize=(width, 2.6), layout="constrained")
     position, heading = figure.subplots(2, 1, sharex=True)
+    largest = max((float(distance.max()) for _, distance, _ in differences.values()), default=0.0)
+    scale, unit = (100.0, "cm") if largest >= 0.01 else (1000.0, "mm")
     for i, (name, (times, distance, turn)) in enumerate(differences.items(), start=1):
-        for axes, values in ((position, 100.0 * distance), (heading, np.degrees(turn))):
+        for axes, values in ((position, scale * distance), (heading, np.degrees(turn))):
             axes.plot(*pieces(times, values, _PIECES)[:2], **line_style(i), label=name)
-    for axes, label in ((position, "distance (cm)"), (heading, "turn (°)")):
+    for axes, label in ((position, f"distance ({unit})"), (heading, "turn (°)")):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
     heading.set_xlabel("time (s)")
@@ -50,15 +52,19 @@ def differences_figure(differences: Mapping[str, tuple[Floats, Floats, Floats]],
 
 
 @for_paper
-def distribution_figure(errors: Mapping[str, Floats], *, xlabel: str, width: float = SINGLE) -> Figure:
+def distribution_figure(
+    errors: Mapping[str, Floats], *, xlabel: str, least: float = _LEAST, width: float = SINGLE
+) -> Figure:
     """Draw which part of the errors is below a value: the cumulative distribution, over a logarithmic scale.
 
     Parameters
     ----------
     errors : mapping of str to ndarray, shape (n,)
-        Per run, m; what is not finite is left out.
+        Per run; what is not finite is left out.
     xlabel : str
         What they are, with unit.
+    least : float
+        Errors below it count as it: a logarithmic scale has no zero.
     width : float
         Inches.
 
@@ -69,14 +75,14 @@ def distribution_figure(errors: Mapping[str, Floats], *, xlabel: str, width: flo
     figure = Figure(figsize=(width, 2.3), layout="constrained")
     axes = figure.add_subplot()
     for i, (name, values) in enumerate(errors.items()):
-        known = np.sort(np.maximum(values[np.isfinite(values)], _LEAST))
+        known = np.sort(np.maximum(values[np.isfinite(values)], least))
         share = np.arange(1, len(known) + 1) / max(len(known), 1)
         at = np.unique(np.linspace(0, len(known) - 1, 600).astype(np.intp)) if len(known) else np.zeros(0, np.intp)
         axes.plot(known[at], share[at], **line_style(i), label=name)
     together = np.concatenate([values[np.isfinite(values)] for values in errors.values()])
     if len(together):
         low, high = np.quantile(together, (0.005, 1.0)).tolist()
-        axes.set_xlim(max(low, _LEAST), max(high, 2.0 * max(low, _LEAST)))
+        axes.set_xlim(max(low, least), max(high, 2.0 * max(low, least)))
     spread_logarithmic(axes, "x")
     axes.set(xlabel=xlabel, ylabel="share of the errors below", ylim=(0.0, 1.0))
     return legend_below(figure, axes, 2)

@@ -48,7 +48,7 @@ def _title(run: JudgedRun) -> str:
 def _rows(runs: Sequence[JudgedRun], competing: frozenset[str]) -> list[Row]:
     rows = []
     for measure in MEASURES:
-        values = [measure.value(run.metrics) for run in runs]
+        values = measure.values(run.metrics for run in runs)
         if any(value is not None for value in values):
             texts = [measure.text(value) for value in values]
             best = _best(measure, runs, values, competing)
@@ -73,7 +73,7 @@ def _over_recordings(report: RunsReport) -> list[str]:
     settings: dict[tuple[str, str], list[tuple[str, JudgedRun]]] = {}
     for group in report.groups:
         for run in group.runs:
-            if run.result.complete:
+            if run.name in group.whole:
                 key = str(flat(run.config)), str(run.about.get("contourslam"))
                 settings.setdefault(key, []).append((group.recording, run))
     repeated = [found for found in settings.values() if len({recording for recording, _ in found}) > 1]
@@ -89,7 +89,7 @@ def _over_recordings(report: RunsReport) -> list[str]:
         columns.append(aggregate([run.metrics for _, run in found]))
     rows = [Row("runs", [Cell(str(len(found))) for found in repeated])]
     for measure in MEASURES:
-        values = [measure.value(column) for column in columns]
+        values = measure.values(columns)
         if any(isinstance(value, dict) for value in values):
             rows.append(Row(measure.name, [_spread(measure, value) for value in values]))
     caption = "Each setting over its recordings: mean and standard deviation"

@@ -18,6 +18,7 @@ from contourslam.slam.landmark_map import CornerMap, WallMap
 
 Floats = NDArray[np.float64]
 
+_LEAST = {"m": 1e-4, "°": 1e-3}
 _UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 
 
@@ -38,11 +39,15 @@ def _alignment(group: Group) -> str:
     moved = []
     for run, motion in zip(group.runs[1:], group.motions[1:], strict=True):
         turn = math.degrees(motion[2])
-        moved.append(f"{run.name} by {math.hypot(motion[0], motion[1]):.3f} m and {turn:.2f}°")
+        moved.append(f"{run.name} by {_length(math.hypot(motion[0], motion[1]))} and {turn:.2f}°")
     return (
         f"Each run was moved as a whole, without scale, so that its positions fit those of {first} best in the least "
         f"squares at the scans that both have: {'; '.join(moved)}. The errors in the tables do not depend on it."
     )
+
+
+def _length(value: float) -> str:
+    return f"{value:.2f} m" if value >= 1.0 else f"{100 * value:.1f} cm" if value >= 0.01 else f"{1000 * value:.2g} mm"
 
 
 def _ways(report: RunsReport, group: Group) -> str:
@@ -57,7 +62,7 @@ def _ways(report: RunsReport, group: Group) -> str:
         scale=PX,
     )
     said = "; ".join(
-        f"{name} {100 * float(one.position.mean()):.1f} cm on average, {100 * float(one.position.max()):.1f} cm at most"
+        f"{name} {_length(float(one.position.mean()))} on average, {_length(float(one.position.max()))} at most"
         for name, one in differences.items()
     )
     apart = report.gallery.add(
@@ -72,18 +77,31 @@ def _ways(report: RunsReport, group: Group) -> str:
 
 
 def _errors(report: RunsReport, group: Group) -> list[str]:
+    runs = [run for run in group.runs if run.name in group.whole] or group.runs  # a part has other errors than all
+    relations = {run.name: run.relations.estimate for run in runs if run.relations is not None}
+    shown = {
+        ("relation_errors", "relation error", "m"): {name: known.translation for name, known in relations.items()},
+        ("relation_turns", "relation error, rotation", "°"): {
+            name: np.degrees(known.rotation) for name, known in relations.items()
+        },
+        ("position_errors", "position error", "m"): {
+            run.name: errors for run in runs if (errors := run.position_errors) is not None
+        },
+    }
     pictures = []
-    relations = {run.name: run.relations.estimate.translation for run in group.runs if run.relations is not None}
-    positions = {run.name: errors for run in group.runs if (errors := run.position_errors) is not None}
-    for name, found, title in (
-        ("relation_errors", relations, "relation error (m)"), ("position_errors", positions, "position error (m)"),
-    ):  # fmt: skip
+    for (name, what, unit), found in shown.items():
         if found:
-            drawn = distribution_figure(found, xlabel=title)
-            medians = ", ".join(f"{run} {np.nanmedian(values):.4f} m" for run, values in found.items())
-            alt = f"Share of the errors below a value, one line a run; medians: {medians}"
-            caption = f"Share of the errors below a value. Medians: {medians}."
-            pictures.append(report.gallery.add(report.name(name, group), drawn, alt=alt, caption=caption, scale=PX))
+            ending = " m" if unit == "m" else unit
+            medians = ", ".join(f"{run} {np.nanmedian(values):.4f}{ending}" for run, values in found.items())
+            pictures.append(
+                report.gallery.add(
+                    report.name(name, group),
+                    distribution_figure(found, xlabel=f"{what} ({unit})", least=_LEAST[unit]),
+                    alt=f"Share of {what}s below a value, one line a run; medians: {medians}",
+                    caption=f"{what[0].upper()}{what[1:]}: share below a value. Medians: {medians}.",
+                    scale=PX,
+                )
+            )
     pairs = group.pairs()
     if not (pictures or pairs):
         return [paragraph("None of these runs was judged by true poses or by known relative poses.", "note")]

@@ -9,12 +9,13 @@ from contourslam.settings_file import settings_text
 def section(report: RunsReport) -> Section:
     """Give the section; every comparison has it."""
     commands = "\n".join(str(run.about.get("command") or f"(unknown: {run.name})") for run in report.runs)
+    first = report.runs[0]
     parts = [heading("Command"), verbatim(report.command)] if report.command else []
     parts += [
         heading("The runs"),
         verbatim(commands),
         definitions({run.name: str(run.folder) for run in report.runs} | software()),
-        *(folded(f"Every setting of {run.name}", verbatim(settings_text(run.config))) for run in report.runs),
+        folded(f"Every setting of {first.name}", verbatim(settings_text(first.config))),
         paragraph("metrics.json beside this page holds every number, tables/ and figures/ all that it shows.", "note"),
     ]
     return Section("reproduce", "Reproduce this", "\n".join(parts))
