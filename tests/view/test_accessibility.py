@@ -17,7 +17,7 @@ def faults():
 
     def ask(page) -> list[str]:
         found = checker.run(page).response["violations"]
-        return [f"{fault['id']}: {node['target']} {node['failureSummary']}" for fault in found for node in fault["nodes"]]
+        return [f"{fault['id']}: {node['target']} {node['html']}" for fault in found for node in fault["nodes"]]
 
     return ask
 

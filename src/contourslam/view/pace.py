@@ -156,6 +156,7 @@ class Pace:
         if elapsed <= self._hurry:
             self._anchor = None
             return 0.0
+        self._hurry = -math.inf  # it is there
         if self._steps > 0:
             self._steps -= 1
             self._anchor = None
