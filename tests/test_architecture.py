@@ -12,7 +12,7 @@ PACKAGE = Path(contourslam.__file__).parent
 ROOT = PACKAGE.parents[1]
 
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
-GROUND = ("errors", "nearest", "closing", "atomic", "settings_file", "config", "kernels", "geometry", "scan")
+GROUND = ("errors", "nearest", "display", "closing", "atomic", "settings_file", "config", "kernels", "geometry", "scan")
 LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "replay")
 ORDER = (
     *GROUND,

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.display import CONTOURS, Sketch, card
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -42,3 +44,17 @@ class Contours:
     def points_in(self, length: float, otherwise: int) -> int:
         """Points that a length (m) spans, at least 2; `otherwise` on raw contours, whose points have no one spacing."""
         return max(round(length / self.spacing), 2) if self.spacing > 0.0 else otherwise
+
+    def _repr_html_(self) -> str:
+        """Show them in a notebook, neighbours in different colours."""
+        sketch = Sketch(f"{len(self)} contours of a scan")
+        self.draw(sketch)
+        figures = {"contours": len(self), "closed": int(self.closed.sum()), "points": len(self.points)}
+        return card("Contours", figures | ({"spacing": f"{self.spacing:g} m"} if self.spacing else {}), sketch.svg())
+
+    def draw(self, sketch: Sketch) -> None:
+        """Draw them into a sketch that is shown in a notebook."""
+        for number, colour in enumerate(CONTOURS):
+            mine = [self[i] for i in range(number, len(self), len(CONTOURS))]
+            if mine:
+                sketch.dots(np.concatenate(mine), colour, 2.4)

@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from contourslam.config import Config
+from contourslam.config import Config, LidarConfig
 from contourslam.contour import Contours, equalize, segment
 from contourslam.contour.contours import Floats, Ints
-from contourslam.detectors import Detector, suppress
+from contourslam.detectors import Detector, make_detector, suppress
+from contourslam.display import CORNER, POINT, WALL, Sketch, card, metres
 from contourslam.landmarks.corner import Corners, refine_corners
 from contourslam.landmarks.wall import Walls, extract_walls
 from contourslam.scan import LaserScan
@@ -18,6 +20,7 @@ from contourslam.scan.validity import valid_beams
 NO_MOTION = (np.empty(0), np.empty((0, 3)))
 NO_WALLS = Walls(np.empty((0, 2, 2)), np.empty((0, 2)), np.empty((0, 2, 2)), np.empty((0, 2, 2, 2)))
 Lap = Callable[[str], None]
+_FAR = 1e6  # m; no lidar sees as far
 
 
 def _no_lap(stage: str) -> None:
@@ -48,6 +51,24 @@ class Detection:
     candidates: Ints
     corners: Corners
     walls: Walls
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook: contours, walls and corners around the lidar."""
+        sketch = Sketch(f"{len(self.corners)} corners in a scan")
+        self.contours.draw(sketch)
+        sketch.lines(self.walls.end_points, WALL, 0.8)
+        sketch.dots(np.zeros((1, 2)), POINT, 8.0)
+        sketch.dots(self.corners.positions, CORNER, 7.0)
+        figures: dict[str, object] = {
+            "contours": len(self.contours),
+            "candidates": len(self.candidates),
+            "corners (red)": len(self.corners),
+            "walls": len(self.walls),
+        }
+        if len(self.corners):
+            sigmas = np.sqrt(0.5 * np.trace(self.corners.covariances, axis1=1, axis2=2))
+            figures["σ of a corner, median"] = metres(float(np.median(sigmas)))
+        return card("What was seen in a scan", figures, sketch.svg())
 
 
 def trace(
@@ -124,3 +145,44 @@ def detect(scan: LaserScan, detector: Detector, config: Config) -> Detection:
     Detection
     """
     return find_landmarks(trace(scan, config), detector, config)
+
+
+def find_corners(
+    ranges: ArrayLike, angles: ArrayLike, detector: str = "matched_filter", *, sigma_range: float = 0.01
+) -> tuple[Floats, Ints]:
+    """Corners of a scan that is two arrays, as two arrays: all defaults, for a first look.
+
+    Parameters
+    ----------
+    ranges : array_like, shape (n,)
+        m; NaN, infinite and 0 mean that nothing came back.
+    angles : array_like, shape (n,)
+        Direction of each beam in the lidar's frame, rad, in their order.
+    detector : str
+        A key of :data:`contourslam.detectors.DETECTORS`.
+    sigma_range : float
+        Standard deviation of a range, m.
+
+    Returns
+    -------
+    positions : ndarray, shape (k, 2)
+        Corners, refined, in the lidar's frame, m.
+    beams : ndarray of int, shape (k,)
+        The beam that fell nearest to each.
+
+    Raises
+    ------
+    ScanError
+        If the arrays differ in shape, or an angle is not finite.
+    ConfigError
+        If there is no such detector.
+    """
+    values, directions = np.asarray(ranges, dtype=np.float64), np.asarray(angles, dtype=np.float64)
+    scan = LaserScan(0.0, directions, values, np.zeros(directions.shape), 0.0, np.inf)
+    config = Config(lidar=LidarConfig(sigma_range=sigma_range, max_range=_FAR))
+    corners = detect(scan, make_detector(detector), config).corners
+    x, y = corners.positions[:, :1], corners.positions[:, 1:]
+    with np.errstate(invalid="ignore"):
+        off = np.hypot(x - values * np.cos(directions), y - values * np.sin(directions))
+    off[~np.isfinite(off)] = np.inf
+    return corners.positions, np.argmin(off, axis=1) if len(off) else np.empty(0, dtype=np.int64)

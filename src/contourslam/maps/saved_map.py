@@ -5,12 +5,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.display import POINT, WAY, Sketch, card
+from contourslam.geometry.poses import transform
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
 NOT_CONTINUABLE = (
     "the map cannot be continued: it holds no keyframes, or not what binds them; map anew with --back-end graph"
 )
 Floats = NDArray[np.float64]
+_MOST_CONTOURS = 300  # whose points are drawn in a notebook
 Ints = NDArray[np.int64]
 
 
@@ -152,3 +155,19 @@ class SavedMap:
         """Whether it holds all that a further drive needs to go on in it."""
         parts = (self.keyframes, self.relations, self.seen, self.stretches)
         return all(part is not None for part in parts) and bool(self.keyframes)
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        sketch, keyframes = Sketch("a map that is kept, from above"), self.keyframes
+        figures: dict[str, object] = {"corners": len(self.corners.ids), "walls": len(self.walls.ids)}
+        if keyframes is not None and len(keyframes):
+            every = range(0, len(keyframes), 1 + len(keyframes) // _MOST_CONTOURS)
+            seen = [transform(keyframes.poses[i], keyframes.contour(i)[:, :2].astype(np.float64)) for i in every]
+            sketch.dots(np.concatenate(seen), POINT, 1.0)
+            for drive in np.unique(keyframes.drives).tolist():
+                sketch.way(keyframes.poses[keyframes.drives == drive, :2], WAY)
+            figures |= {"keyframes": len(keyframes), "drives": len(np.unique(keyframes.drives))}
+        self.walls.draw(sketch)
+        self.corners.draw(sketch)
+        figures["can be gone on in"] = "yes" if self.continuable else "no"
+        return card("A map that is kept", figures | dict(self.about), sketch.svg())

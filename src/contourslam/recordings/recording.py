@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.display import card
+from contourslam.errors import RecordingError
 from contourslam.geometry.fisheye import FisheyeModel
 from contourslam.recordings.base_readings import WheelReading
 from contourslam.recordings.picture import Picture
@@ -142,6 +144,20 @@ class Recording(ABC):
         """From the earliest to the latest stamp, s."""
         start, end = self.start, self.end
         return None if start is None or end is None else end - start
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook: what is in it."""
+        figures: dict[str, object] = {}
+        try:
+            figures = {topic.name: f"{topic.count} × {topic.message_type}" for topic in self.topics()}
+            if self.duration is not None:
+                figures["time"] = f"{self.duration:.1f} s"
+        except RecordingError as error:
+            figures["damage"] = error
+        if self.lidar_mount is not None:
+            x, y, yaw = self.lidar_mount
+            figures["lidar on the robot"] = f"x {x:.3f} m, y {y:.3f} m, {np.degrees(yaw):.1f}°"
+        return card(f"Recording {self.path.name}", figures | {f"note {i + 1}": n for i, n in enumerate(self.notes)})
 
 
 class SkipCount:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contourslam.display import POINT, WALL, Sketch, card
 from contourslam.errors import ScanError
 
 
@@ -59,6 +60,25 @@ class LaserScan:
             raise ScanError(
                 f"scan at stamp {self.stamp}: range limits [{self.range_min}, {self.range_max}] m are not a range"
             )
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook: where the beams ended, around the lidar."""
+        with np.errstate(invalid="ignore"):
+            returned = (self.ranges >= self.range_min) & (self.ranges <= self.range_max) & np.isfinite(self.ranges)
+        angles, ranges = self.angles[returned], self.ranges[returned]
+        sketch = Sketch(f"a scan of {len(ranges)} points around its lidar")
+        sketch.dots(np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=-1), WALL, 2.0)
+        sketch.dots(np.zeros((1, 2)), POINT, 8.0)
+        far = math.isfinite(self.range_max)
+        figures: dict[str, object] = {
+            "stamp": f"{self.stamp:.3f} s",
+            "beams, returned": f"{len(self.ranges)}, {len(ranges)}",
+            "a range is": f"{self.range_min:g} m or more" + (f", up to {self.range_max:g} m" if far else ""),
+        }
+        if len(self.angles):
+            figures["angles"] = f"{np.degrees(self.angles[0]):.1f}° to {np.degrees(self.angles[-1]):.1f}°"
+            figures["from first to last beam"] = f"{1e3 * (self.offsets[-1] - self.offsets[0]):.1f} ms"
+        return card("Laser scan", figures, sketch.svg())
 
 
 def _unchanging(values: object) -> bool:

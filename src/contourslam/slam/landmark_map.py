@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.display import CORNER, WALL, Sketch, card, metres
+
 Floats = NDArray[np.float64]
 
 
@@ -39,6 +41,22 @@ class CornerMap:
     observed: NDArray[np.int64]
     failed: NDArray[np.int64]
 
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        sketch = Sketch(f"{len(self.ids)} corners from above")
+        self.draw(sketch)
+        figures: dict[str, object] = {"corners": len(self.ids), "convex": int(self.convex.sum())} | _seen(
+            self.observed, self.failed
+        )
+        if len(self.ids):
+            sigmas = np.sqrt(0.5 * np.trace(self.covariances, axis1=1, axis2=2))
+            figures["σ of a position, median"] = metres(float(np.median(sigmas)))
+        return card("Corners of a map", figures, sketch.svg())
+
+    def draw(self, sketch: Sketch) -> None:
+        """Draw it into a sketch that is shown in a notebook."""
+        sketch.dots(self.positions, CORNER, 4.0)
+
 
 @dataclass(frozen=True, slots=True)
 class WallMap:
@@ -67,3 +85,22 @@ class WallMap:
     line_covariances: Floats
     observed: NDArray[np.int64]
     failed: NDArray[np.int64]
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        sketch = Sketch(f"{len(self.ids)} walls from above")
+        self.draw(sketch)
+        length = float(np.hypot(*(self.end_points[:, 1] - self.end_points[:, 0]).T).sum())
+        figures: dict[str, object] = {"walls": len(self.ids), "together": metres(length)} | _seen(
+            self.observed, self.failed
+        )
+        return card("Walls of a map", figures, sketch.svg())
+
+    def draw(self, sketch: Sketch) -> None:
+        """Draw it into a sketch that is shown in a notebook."""
+        sketch.lines(self.end_points, WALL)
+
+
+def _seen(observed: NDArray[np.int64], failed: NDArray[np.int64]) -> dict[str, object]:
+    chances = int(observed.sum() + failed.sum())
+    return {"seen when they should have been": f"{observed.sum() / chances:.1%} of {chances}"} if chances else {}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.display import ODOMETRY, TRUTH, WAY, Sketch, card, metres
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
 Floats = NDArray[np.float64]
@@ -171,3 +172,35 @@ class RunResult:
     quality: Floats | None = None
     loops: tuple[Loop, ...] = ()
     readings: OdometryReadings | None = None
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook: the map with the way, over the true one and raw odometry."""
+        sketch = Sketch(f"map and way of {len(self.stamps)} scans")
+        sketch.way(self.odometry[:, :2], ODOMETRY, 0.8)
+        self.wall_map.draw(sketch)
+        if self.truth is not None:
+            sketch.way(self.truth[:, :2], TRUTH, 2.4)
+        sketch.way(self.poses[:, :2], WAY)
+        self.corner_map.draw(sketch)
+        return card(
+            "A recording mapped" if self.complete else "A part of a recording mapped", self._figures(), sketch.svg()
+        )
+
+    def _figures(self) -> dict[str, object]:
+        figures: dict[str, object] = {"back end": self.back_end, "detector": self.detector, "scans": len(self.stamps)}
+        if len(self.stamps):
+            figures["time"] = f"{np.ptp(self.stamps):.1f} s"
+            figures["way (blue)"] = metres(float(np.hypot(*np.diff(self.poses[:, :2], axis=0).T).sum()))
+        figures["corners (red), walls"] = f"{len(self.corner_map.ids)}, {len(self.wall_map.ids)}"
+        if self.loops:
+            figures["loops"] = len(self.loops)
+        if self.truth is not None and len(self.stamps):
+            for name, poses in (
+                ("error from the truth (green)", self.poses),
+                ("that of odometry (yellow)", self.odometry),
+            ):
+                error = np.hypot(*(poses - self.truth)[:, :2].T)
+                figures[f"{name}, RMS"] = metres(float(np.sqrt(np.mean(error**2))))
+        if self.seconds and len(self.stamps):
+            figures["CPU time per scan"] = f"{1e3 * sum(self.seconds.values()) / len(self.stamps):.2f} ms"
+        return figures | {f"skipped: {reason}": count for reason, count in self.skipped.items()}
