@@ -68,14 +68,14 @@ export function drawInnovations(canvas, story, until) {
   }
   const sizes = points.map(([dx, dy]) => Math.hypot(dx, dy)).sort((a, b) => a - b);
   const most = tidy(Math.max(1.1 * (sizes[Math.floor(0.97 * (sizes.length - 1))] || 1), 1));
-  const scale = (height / 2 - 12) / most, cx = width / 2, cy = height / 2;
+  const scale = (height / 2 - 14) / most, cx = width / 2, cy = height / 2;
   ctx.strokeStyle = colour("grid");
   ctx.fillStyle = colour("muted");
   for (const part of [0.5, 1]) {
     ctx.beginPath();
     ctx.arc(cx, cy, part * most * scale, 0, 2 * Math.PI);
     ctx.stroke();
-    ctx.fillText(`${Number((part * most).toPrecision(2))} cm`, cx + part * most * scale + 3, cy - 3);
+    ctx.fillText(`${Number((part * most).toPrecision(2))} cm`, cx + 4, cy - part * most * scale - 3);
   }
   ctx.beginPath();
   ctx.moveTo(cx - height / 2, cy);

@@ -19,19 +19,22 @@ export function drawWalls(view, map, frame) {
   ctx.stroke(strokes[1]);
 }
 
-export function drawCorners(view, map, frame, ids, selected) {
-  const { ctx, sx, sy, camera } = view, n = map.corner_ids.length, axes = new Float32Array(3 * n), majors = [];
+/** How many times larger than they are the ellipses of all maps are drawn. */
+export function liftOf(maps, scale) {
+  const majors = maps.flatMap((map) => (map ? [...map.majors] : [])).sort((p, q) => p - q);
+  const typical = SIGMAS * (majors[majors.length >> 1] || 1) * scale;
+  return LIFTS.find((f) => f * typical >= 5) || LIFTS.at(-1);
+}
+
+export function drawCorners(view, map, frame, ids, selected, lift) {
+  const { ctx, sx, sy, camera } = view, n = map.corner_ids.length, axes = new Float32Array(3 * n);
   for (let i = 0; i < n; i++) {
     const [a, b, c] = map.covariances.subarray(3 * i, 3 * i + 3), middle = (a + c) / 2;
     const half = Math.hypot((a - c) / 2, b);
     axes[3 * i] = SIGMAS * Math.sqrt(Math.max(middle + half, 0));
     axes[3 * i + 1] = SIGMAS * Math.sqrt(Math.max(middle - half, 0));
     axes[3 * i + 2] = 0.5 * Math.atan2(2 * b, a - c);
-    majors.push(axes[3 * i]);
   }
-  majors.sort((p, q) => p - q);
-  const typical = (majors[n >> 1] || 1) * camera.scale;
-  const lift = LIFTS.find((f) => f * typical >= 5) || LIFTS.at(-1);
   const seen = new Set(frame.matched), missed = new Set(frame.missed), style = colour("corner");
   for (let i = 0; i < n; i++) {
     const id = map.corner_ids[i], x = sx(map.corners[2 * i]), y = sy(map.corners[2 * i + 1]);
@@ -57,7 +60,6 @@ export function drawCorners(view, map, frame, ids, selected) {
       ctx.fillText(id, x + 8, y - 8);
     }
   }
-  return lift;
 }
 
 /** Two short strokes along the sides; the dot is filled where matter fills the angle. */

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import { colour, forgetColours } from "./colours.js";
+import { liftOf } from "./landmarks.js";
 import { Link } from "./link.js";
 import { LAYERS, LaneMap } from "./map.js";
 import { Model } from "./model.js";
@@ -115,7 +116,7 @@ function waiting() {
 
 /** What the lines on the map are, of those that are shown. */
 function legend() {
-  const { lift } = maps[0], truth = Boolean(model.frame.truth), loops = model.maps.some((map) => map && map.loop_methods.length);
+  const lift = liftOf(model.maps, camera.scale), truth = Boolean(model.frame.truth), loops = model.maps.some((map) => map && map.loop_methods.length);
   const entries = [
     [layers.walls, "line", "wall", "walls"],
     [layers.corners, "ring", "corner", `corners, 3σ${lift > 1 ? `, ${lift} times larger` : ""}`],

@@ -4,7 +4,7 @@ import { colour } from "./colours.js";
 import { drawScan } from "./crest.js";
 import { Floor } from "./floor.js";
 import { Ink } from "./ink.js";
-import { drawCorners, drawPairs, drawWalls } from "./landmarks.js";
+import { drawCorners, drawPairs, drawWalls, liftOf } from "./landmarks.js";
 import { drawFlashes, drawLine, drawLoops, drawPath, drawRobot, drawScaleBar } from "./way.js";
 
 export const LAYERS = [
@@ -146,7 +146,7 @@ export class LaneMap {
     if (map && layers.walls) drawWalls(this, map, frame);
     if (layers.pairs && map && frame.localized) drawPairs(this, frame, map);
     if (layers.scan && frame.localized) drawScan(this, model, frame, layers.response);
-    this.lift = map && layers.corners ? drawCorners(this, map, frame, layers.ids, selected) : 1;
+    if (map && layers.corners) drawCorners(this, map, frame, layers.ids, selected, liftOf(model.maps, scale));
     if (frame.localized) drawRobot(this, frame); // else it is nowhere in this map
     const moving = drawFlashes(this) || filling;
     this.facts.textContent = map

@@ -127,7 +127,11 @@ export class Model {
 function readMap({ arrays: a }, version) {
   const byId = new Map();
   a.corner_ids.forEach((id, i) => byId.set(id, i));
-  return { ...a, version, byId, knots: a.path.length / 3 };
+  const majors = Float32Array.from(a.corner_ids, (_, i) => { // standard deviation of each corner where it is largest
+    const [xx, xy, yy] = a.covariances.subarray(3 * i, 3 * i + 3);
+    return Math.sqrt(Math.max((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy), 0));
+  });
+  return { ...a, version, byId, majors, knots: a.path.length / 3 };
 }
 
 function readFrame(message) {

@@ -17,7 +17,10 @@ const text = (tag, content, parent, more = {}) => {
   return node;
 };
 const name = (lane) => lane.replaceAll("_", " ");
-const angle = (rad) => `${(((rad * 180) / Math.PI + 540) % 360 - 180).toFixed(1)}°`;
+const angle = (rad) => {
+  const degrees = Number((((rad * 180) / Math.PI + 540) % 360 - 180).toFixed(1));
+  return `${(degrees || 0).toFixed(1)}°`; // zero has no sign
+};
 
 export function drawPanels(model, selected) {
   const { frame, about } = model, lanes = about.lanes;
