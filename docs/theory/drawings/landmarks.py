@@ -43,7 +43,7 @@ def corners_seen(opening_deg: float, count: int) -> tuple[Floats, Floats, Floats
 def figure_refinement() -> Figure:
     """Lines fitted to the two sides of a corner, and where they meet."""
     walls, lidar = wedge(math.radians(90.0)), LIDAR + np.array([0.0, 0.0, 0.009])
-    scan = scan_of(walls, lidar, sigma=SIGMA, beams=360, chance=6)
+    scan = scan_of(walls, lidar, sigma=SIGMA, beams=360, chance=36)
     found = detect(scan, DETECTOR, NOISY)
     corners, points = found.corners, transform(lidar, found.contours.points)
     (x, y), vertex = transform(lidar, corners.positions[0]), transform(lidar, corners.vertices[0])
