@@ -160,7 +160,7 @@ def _punctuality(result: LoopResult) -> Section:
     note = paragraph(
         "A world that is late holds every sensor up; the errors above are then the machine's, not the robot's."
     )
-    return Section("time", "Real time", table("How punctual everything was", ["", ""], rows) + note)
+    return Section("time", "Real time", table("How punctual everything was", ["what", "how much"], rows) + note)
 
 
 def _line(result: LoopResult) -> Section:
@@ -184,7 +184,7 @@ def _line(result: LoopResult) -> Section:
         paragraph(f"{trouble.stamp - begin:.1f} s: {trouble.message or f'the {trouble.part} is there again'}")
         for trouble in result.troubles
     )
-    return Section("line", "What went wrong", table("The serial lines", ["", ""], rows) + told)
+    return Section("line", "What went wrong", table("The serial lines", ["what", "how much"], rows) + told)
 
 
 def _pictures(folder: Path, result: LoopResult) -> Section | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from contourslam.report.svg.drawing import Drawing
 
-SCRIPTS = ("panel.js", "moment.js", "facts.js", "layers.js", "map.js", "chart.js", "save.js", "drawn.js")
+SCRIPTS = ("panel.js", "moment.js", "facts.js", "layers.js", "gestures.js", "map.js", "chart.js", "save.js", "drawn.js")
 """What a page with drawings runs, in this order."""
 
 

@@ -1,10 +1,14 @@
 // Every drawing of the page comes alive, at the width there is for it; on paper at that of paper.
 
+const PAPER = [680, 430]; // px of an A4 sheet between its margins, and what a map's height may take of it
+const figures = [];
+let printing = false;
+
 addEventListener("DOMContentLoaded", () => {
-  const PAPER = 680; // px of an A4 sheet between its margins
   const kinds = { map: MapFigure, chart: ChartFigure };
-  const figures = [...document.querySelectorAll("figure.drawn")].map((figure) => new kinds[figure.dataset.kind](figure));
+  for (const figure of document.querySelectorAll("figure.drawn")) figures.push(new kinds[figure.dataset.kind](figure));
   const fit = () => {
+    if (printing) return;
     for (const figure of figures) {
       const width = Math.floor(figure.stage.clientWidth);
       if (width > 0 && width !== figure.width) figure.layout(figure.width = width);
@@ -13,12 +17,15 @@ addEventListener("DOMContentLoaded", () => {
   new ResizeObserver(fit).observe(document.querySelector("main"));
   fit();
   addEventListener("beforeprint", () => {
-    moment.set(null, null);
+    printing = true;
     for (const figure of figures) {
-      figure.choose?.(null, true);
-      figure.layout(figure.width = PAPER);
+      [figure.width] = PAPER;
+      figure.layout(...PAPER);
       figure.drawNow();
     }
   });
-  addEventListener("afterprint", fit);
+  addEventListener("afterprint", () => {
+    printing = false;
+    fit();
+  });
 });

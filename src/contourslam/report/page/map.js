@@ -19,7 +19,7 @@ class MapFigure {
     this.card = new Card(this.stage);
     this.chosen = null; // { layer, index, pinned }
     this.tools();
-    this.gestures();
+    listen(this);
     moment.changed.addEventListener("change", () => this.mark());
     this.figure.classList.add("alive");
   }
@@ -62,19 +62,24 @@ class MapFigure {
     bar.append(group);
     this.stage.tabIndex = 0;
     this.stage.setAttribute("role", "group");
-    this.stage.setAttribute("aria-label", "Map: arrows move it, plus and minus zoom, 0 shows all; C, W and L go from corner to "
-      + "corner, wall to wall, loop to loop, with Shift back; Escape lets go");
+    const steps = Object.entries(STEPS).filter(([, layer]) => this.facts[layer] && this.members[layer].length);
+    const through = steps.length
+      ? `; ${steps.map(([key]) => key.toUpperCase()).join(", ")} go through ${steps.map(([, layer]) => layer).join(", ")}` : "";
+    this.stage.setAttribute("aria-label",
+      `Map: arrows move it, plus and minus zoom, 0 shows all${through}, with Shift back; Escape lets go`);
     const hint = Object.assign(document.createElement("p"), { className: "hint" });
-    hint.textContent = "Point at anything to ask for it, click to hold it. Drag, double click, pinch, Ctrl and wheel (or the wheel "
-      + "alone after a click) and the keys ← ↑ → ↓ + − 0 move and zoom; C, W, L go through corners, walls, loops.";
+    hint.textContent = matchMedia("(pointer: coarse)").matches
+      ? "Tap anything to ask for it. Two fingers move and zoom, once closer one finger moves."
+      : "Point at anything to ask for it, click to hold it. Drag, double click, Ctrl and wheel (the wheel alone after a click) "
+        + `and the keys ← ↑ → ↓ + − 0 move and zoom${through}.`;
     this.stage.after(hint);
   }
 
-  /** Lay out for so many px of width. */
-  layout(width) {
+  /** Lay out for so many px of width, and no more than so many of height. */
+  layout(width, tallest = Math.max(300, Math.min(0.78 * innerHeight, 820))) {
     const { panel } = this, wide = width >= 620, scale = panel.parts.scale !== null;
     const left = wide ? 62 : 48, right = scale && wide ? 110 : 12, top = wide ? 24 : 8, { base } = panel;
-    const w = width - left - right, tallest = Math.max(300, Math.min(0.78 * innerHeight, 820));
+    const w = width - left - right;
     const h = Math.round(Math.max(Math.min(w * base.h / base.w, tallest), Math.min(w, 240)));
     const before = panel.frame.w / panel.view.w, whole = this.home === undefined || this.closeness() < 1.01;
     panel.frame = { x: left, y: top, w, h };
@@ -134,7 +139,7 @@ class MapFigure {
     let best = null, least = Infinity;
     if (!this.panel.holds(px, py)) return null;
     for (const [layer, members] of Object.entries(this.members)) {
-      if (!this.facts[layer] || !members.length || (layer !== "errors" && !this.layers.shown(layer))) continue;
+      if (!this.facts[layer] || !members.length || !this.layers.shown(layer)) continue;
       for (let index = 0; index < members.length; index++) {
         const away = this.distance(members[index], px, py) / (REACH[layer] * reach);
         if (away <= 1 && away * FIRST[layer] < least) [best, least] = [{ layer, index }, away * FIRST[layer]];
@@ -209,77 +214,6 @@ class MapFigure {
     this.pointer = null;
     this.choose({ layer, index }, true, true);
     this.redraw();
-  }
-
-  gestures() {
-    const { stage } = this, pointers = new Map();
-    let moved = 0;
-    const at = (event) => {
-      const box = this.svg.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
-    this.svg.addEventListener("pointerdown", (event) => {
-      if (event.button > 0) return;
-      pointers.set(event.pointerId, at(event));
-      moved = pointers.size > 1 ? 99 : 0;
-    });
-    this.svg.addEventListener("pointermove", (event) => {
-      const before = pointers.get(event.pointerId), now = at(event);
-      if (!before) {
-        if (event.pointerType === "mouse" && !this.chosen?.pinned) {
-          this.pointer = now;
-          this.choose(this.at(...now), false);
-          if (this.chosen) this.card.moveTo(...now);
-        }
-        return;
-      }
-      const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
-      moved += Math.hypot(dx, dy);
-      if (pointers.size === 1 && moved > 4) {
-        if (!this.svg.hasPointerCapture(event.pointerId)) this.svg.setPointerCapture(event.pointerId);
-        stage.classList.add("held");
-        this.move(dx, dy);
-      } else if (pointers.size === 2) {
-        const other = [...pointers].find(([id]) => id !== event.pointerId)[1];
-        const apart = (point) => Math.max(1, Math.hypot(point[0] - other[0], point[1] - other[1]));
-        this.move(dx / 2, dy / 2);
-        this.zoom(apart(now) / apart(before), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
-      }
-      pointers.set(event.pointerId, now);
-    });
-    const end = (event) => {
-      const had = pointers.delete(event.pointerId);
-      if (!pointers.size) stage.classList.remove("held");
-      if (!had || event.type !== "pointerup" || moved > 6 || pointers.size) return;
-      this.pointer = null;
-      this.choose(this.at(...at(event), event.pointerType === "mouse" ? 1 : 2), true);
-    };
-    for (const name of ["pointerup", "pointercancel"]) this.svg.addEventListener(name, end);
-    this.svg.addEventListener("pointerleave", () => {
-      this.pointer = null;
-      if (!this.chosen?.pinned) this.choose(null, false);
-    });
-    this.svg.addEventListener("dblclick", (event) => this.zoom(event.shiftKey ? 0.5 : 2, ...at(event)));
-    stage.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey && !event.metaKey && document.activeElement !== stage) return; // the reader scrolls the page
-      event.preventDefault();
-      const by = event.deltaY * (event.deltaMode === 1 ? 16 : 1) * (event.ctrlKey ? 3 : 1);
-      this.zoom(Math.exp(-Math.max(-120, Math.min(120, by)) / 300), ...at(event));
-    }, { passive: false });
-    stage.addEventListener("touchmove", (event) => {
-      if (event.touches.length > 1) event.preventDefault(); // two fingers are for the map, one scrolls the page
-    }, { passive: false });
-    stage.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || event.target !== stage) return;
-      const act = {
-        ArrowLeft: () => this.move(60, 0), ArrowRight: () => this.move(-60, 0), ArrowUp: () => this.move(0, 60),
-        ArrowDown: () => this.move(0, -60), "+": () => this.zoom(1.6), "=": () => this.zoom(1.6),
-        "-": () => this.zoom(1 / 1.6), 0: () => this.fit(), Escape: () => this.choose(null, true),
-      }[event.key];
-      const layer = STEPS[event.key.toLowerCase()];
-      if (act) act(); else if (layer) this.step(layer, event.shiftKey ? -1 : 1); else return;
-      event.preventDefault();
-    });
   }
 }
 

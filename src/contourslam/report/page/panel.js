@@ -123,7 +123,7 @@ class Panel {
   placeScale(scale) {
     const { x, y, w, h } = this.frame, beside = x + w + 96 <= this.pageWidth, [label] = [...scale.children].slice(-1);
     const boxes = scale.querySelectorAll("rect"), words = [...scale.querySelectorAll("text")].slice(0, -1);
-    const left = beside ? x + w + 16 : x + w - 46, height = beside ? 0.6 * h : Math.min(110, 0.4 * h);
+    const left = beside ? x + w + 16 : x + w - 54, height = beside ? 0.6 * h : Math.min(110, 0.4 * h);
     const top = beside ? y + 0.2 * h : y + 30, step = height / boxes.length;
     const put = (part, attributes) => { for (const key in attributes) part.setAttribute(key, attributes[key]); };
     boxes.forEach((box, k) => put(box, { x: left, y: top + k * step, height: step + 0.5, width: beside ? 12 : 8 }));

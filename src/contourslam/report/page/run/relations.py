@@ -9,7 +9,7 @@ from contourslam.report.page.run.values import RunValues, count, degrees, length
 from contourslam.report.svg.series import relation_drawing
 from contourslam.report.svg.way import error_map_drawing
 
-_HEADERS = ("", "mean", "sd", "median", "max", "rotation, mean", "rotation, median")
+_HEADERS = ("trajectory", "mean", "sd", "median", "max", "rotation, mean", "rotation, median")
 
 _WORDS = (
     "Good errors lie flat and far below raw odometry's, whose error grows with the way between two times. A peak "

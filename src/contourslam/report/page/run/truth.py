@@ -27,7 +27,7 @@ def section(values: RunValues) -> Section | None:
     ]
     inside = metrics.get("inside_two_sigma") or {}
     rows.append(Row("estimate inside ±2σ (ideal 95.4 %)", [Cell(_percent(inside.get(k))) for k in ("x", "y", "theta")]))
-    numbers = table("RMS error against the true poses", ["", "x", "y", "heading"], rows)
+    numbers = table("RMS error against the true poses", ["trajectory", "x", "y", "heading"], rows)
     figure = drawn(
         error_drawing(result),
         kind="chart",
