@@ -16,6 +16,7 @@ from contourslam.evaluation.metrics import run_metrics
 from contourslam.evaluation.relations import JudgedRelations, judge
 from contourslam.geometry.poses import between
 from contourslam.report.run_page import write_run_page
+from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
 from contourslam.report.svg.series import pieces
 from contourslam.slam.result import RunResult
 
@@ -60,18 +61,18 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def opened(browser: Any, page_file: Path) -> Iterator[Callable[..., Any]]:
-    """Open the page; whatever it asks for elsewhere, or complains of, fails the test."""
+    """Open a page; whatever it asks for elsewhere, or complains of, fails the test."""
     contexts, wrong = [], []
 
-    def open_page(*, width: int = 1280, **more: Any) -> Any:
+    def open_page(file: Path = page_file, *, width: int = 1280, **more: Any) -> Any:
         context = browser.new_context(viewport={"width": width, "height": 900}, **more)
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda message: wrong.append(message.text))
         page.on("pageerror", lambda error: wrong.append(str(error)))
-        own = (page_file.as_uri(), "data:", "blob:")
+        own = (file.as_uri(), "data:", "blob:")
         page.on("request", lambda request: None if request.url.startswith(own) else wrong.append(request.url))
-        page.goto(page_file.as_uri())
+        page.goto(file.as_uri())
         return page
 
     yield open_page
@@ -382,6 +383,28 @@ def test_names_from_outside_stay_text(opened: Callable[..., Any]) -> None:
         said.append(facts(page)["found by"])
     assert NASTY in said
     assert page.locator("img, b").count() == 0
+
+
+def test_a_run_in_which_nothing_happened_has_a_page_that_answers(
+    opened: Callable[..., Any], make_run: Callable[..., RunResult], tmp_path: Path
+) -> None:
+    run = make_run(scans=3)
+    fields = ("stamps", "poses", "covariances", "odometry", "nis", "nis_dof")
+    cut = replace(
+        run,
+        **{name: getattr(run, name)[:1] for name in fields},
+        **{name: getattr(run, name)[:1] for name in ("matched_count", "corner_count", "wall_count")},
+        truth=None,
+        corner_map=EMPTY_CORNERS,
+        wall_map=EMPTY_WALLS,
+    )
+    write_run_page(tmp_path, cut, Config(), run_metrics(cut))
+    page = opened(tmp_path / "index.html")
+    page.mouse.move(*on_screen(page, *cut.poses[0, :2]))
+    assert page.inner_text(f"{MAP} .card strong") == "Pose at 0:00.0 min"
+    page.locator(f"{MAP} .stage").focus()
+    for key in ("c", "w", "l", "+", "0", "Escape"):
+        page.keyboard.press(key)
 
 
 def test_every_figure_can_be_reached_and_named_without_a_mouse(opened: Callable[..., Any]) -> None:

@@ -143,7 +143,11 @@ def _way(result: LoopResult, values: RunValues) -> Section:
         f"steered: {count(len(size.corner_map.ids), 'corner')}, {count(len(size.wall_map.ids), 'wall')}.",
         facts=map_facts(values, known_then(size)),
     )
-    return Section("way", "Map and way", figure)
+    words = paragraph(
+        "Good: the mapped walls lie on the room's, and the robot's own way inside the true one. Where the two ways part, "
+        "everything mapped from there on lies as far off."
+    )
+    return Section("way", "Map and way", words + figure)
 
 
 def _punctuality(result: LoopResult) -> Section:
