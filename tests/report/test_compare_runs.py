@@ -17,6 +17,7 @@ from contourslam.evaluation.relations import judge
 from contourslam.geometry.poses import between, compose
 from contourslam.report.figures.of_runs import figures_of
 from contourslam.report.figures.save import save_figure
+from contourslam.report.page.runs.differs import other_options
 from contourslam.report.page.runs.values import differing
 from contourslam.report.relation_table import RELATIONS, read_relation_table, write_relation_table
 from contourslam.report.result_folder import write_result_folder
@@ -180,14 +181,14 @@ def rows(path: Path) -> dict[str, list[str]]:
 def test_only_runs_of_the_whole_recording_compete_for_the_best(report, folders) -> None:
     text = (report / "index.html").read_text()
     table = rows(report / "tables" / "measures_1.csv")
-    assert table[""] == ["a/out", "b/out", "c (INCOMPLETE)"]
+    assert table["measure"] == ["a/out", "b/out", "c (INCOMPLETE)"]
     first, second, _ = (float(value) for value in table["relation error, mean, m"])
     assert first == pytest.approx(read_runs(folders)[0].relations.estimate.translation.mean(), abs=1e-4)
     assert first < second
     assert f'<td class="better">{first:.4f}</td><td>{second:.4f}</td><td>' in text
     alone = rows(report / "tables" / "measures_2.csv")
     part = text[text.index("Runs of yard.bag") : text.index("Each setting over its recordings")]
-    assert alone[""] == ["d"]
+    assert alone["measure"] == ["d"]
     assert 'class="better"' not in part
 
 
@@ -195,7 +196,7 @@ def test_what_differs_and_nothing_else_is_told_of_the_settings(report) -> None:
     table = rows(report / "tables" / "settings.csv")
     assert table["recording"] == ["hall.bag", "hall.bag", "hall.bag", "yard.bag"]
     assert table["back_end"] == ["ekf", "graph", "ekf", "ekf"]
-    assert set(table) == {"", "recording", "scans", "back_end"}
+    assert set(table) == {"setting", "recording", "scans", "back_end"}
 
 
 def test_a_setting_over_two_recordings_has_mean_and_spread(report) -> None:
@@ -235,6 +236,8 @@ def test_an_earlier_comparisons_figures_do_not_stay(report, folders, tmp_path) -
 
 
 def test_the_page_fits_a_phone_in_a_real_browser(report, browse) -> None:
+    captions = re.findall(r'role="region" aria-label="([^"]+)"', (report / "index.html").read_text())
+    assert len(captions) == len(set(captions))
     seen = browse(report / "index.html", width=360)
     assert seen["data-broken"] == ""
     assert "data-errors" not in seen
@@ -277,3 +280,15 @@ def test_settings_of_the_walls_are_settings_too(tmp_path, make_run) -> None:
     folders = [written(tmp_path / "a", make_run()), written(tmp_path / "b", make_run(), slam=SlamConfig(walls=True))]
     runs = read_runs(folders)
     assert differing(runs) == {"slam.walls": ["False", "True"]}
+
+
+def test_options_that_are_no_settings_are_told_apart_too(tmp_path, make_run) -> None:
+    folders = [written(tmp_path / name, make_run()) for name in ("a", "b")]
+    commands = ("run x.bag --wheel-noise 1 --every 2 --max-scans=9 -o a", "run x.bag --every 2 --detector wu -o b")
+    runs = [
+        replace(run, about=run.about | {"command": f"contourslam {command}"})
+        for run, command in zip(read_runs(folders), commands, strict=True)
+    ]
+    assert other_options(runs) == [["--wheel-noise 1", "--max-scans 9"], []]
+    broken = [replace(run, about={"command": "contourslam run 'x"}) for run in runs]
+    assert other_options(broken) == [[], []]

@@ -110,11 +110,11 @@ def relation_figure(times: Floats, errors: Mapping[str, Floats], *, width: float
     for i, (name, values) in enumerate(errors.items()):
         at, middle, low, high = pieces(times, np.maximum(values, _LEAST), 60)
         if i == 0:
-            axes.fill_between(at, low, high, color=FAINT, alpha=0.7, linewidth=0.0)
+            axes.fill_between(at, low, high, color=FAINT, alpha=0.7, linewidth=0.0, label=f"{name}, middle 90 %")
         axes.plot(at, middle, **line_style(i), label=name)
     spread_logarithmic(axes, "y")
     axes.set(xlabel="time (s)", ylabel="relation error (m)")
-    return legend_below(figure, axes, 3)
+    return legend_below(figure, axes, 2)
 
 
 @for_paper

@@ -25,7 +25,7 @@ def _any_competing(report: RunsReport) -> bool:
 def _of_all(report: RunsReport) -> str:
     words = "" if len(report.groups) == 1 else paragraph("The recordings differ, so that no run is marked as the best.")
     rows = _rows(report.runs, frozenset())
-    return words + report.table("measures", "All runs", ["", *map(_title, report.runs)], rows)
+    return words + report.table("measures", "All runs", ["measure", *map(_title, report.runs)], rows)
 
 
 def _of_group(report: RunsReport, group: Group) -> str:
@@ -36,7 +36,7 @@ def _of_group(report: RunsReport, group: Group) -> str:
     if group.competing:
         words += f"Green: the best of the {len(group.competing)} runs that mapped the whole recording."
     caption = f"Runs of {group.recording}" if many else "All runs"
-    headers = ["", *map(_title, group.runs)]
+    headers = ["measure", *map(_title, group.runs)]
     shown = report.table(report.name("measures", group), caption, headers, _rows(group.runs, group.competing))
     return shown + (paragraph(words, "note") if words else "")
 
@@ -80,7 +80,7 @@ def _over_recordings(report: RunsReport) -> list[str]:
     if not repeated:
         return []
     names = differing([found[0][1] for found in repeated])
-    headers, columns = [""], []
+    headers, columns = ["measure"], []
     for at, found in enumerate(repeated):
         told = [
             values[at] if name in ("detector", "back_end") else f"{name} {values[at]}" for name, values in names.items()

@@ -113,15 +113,16 @@ def _pairs(report: RunsReport, group: Group, pairs: list[Pair]) -> list[str]:
     for measure in dict.fromkeys(one.measure for one in pairs):
         chosen = [one for one in pairs if one.measure == measure]
         unit, scale = _UNITS[chosen[0].unit]
-        headers = ["", f"mean ({unit})", "low", "high", "first smaller in", "pairs", "the interval says"]
+        headers = ["runs", f"mean ({unit})", "low", "high", "first smaller in", "pairs", "the interval says"]
         rows = []
         for one in chosen:
             found = one.difference
             verdict = "first smaller" if found.high < 0.0 else "second smaller" if found.low > 0.0 else "undecided"
-            cells = [*(number(scale * value, 3) for value in (found.mean, found.low, found.high))]
+            cells = [*(number(round(scale * value, 3) + 0.0, 3) for value in (found.mean, found.low, found.high))]
             cells += [f"{100 * found.share:.0f} %", f"{found.count:,}", verdict]
             rows.append(Row(f"{one.first} − {one.second}", [Cell(cell) for cell in cells]))
         caption = f"First minus second, {measure}: mean difference and its 95 % bootstrap interval"
+        caption += "" if len(report.groups) == 1 else f"; {group.recording}"
         name = report.name("difference_of_" + measure.replace(", ", "_").replace(" ", "_"), group)
         tables.append(report.table(name, caption, headers, rows))
     words = (
