@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from contourslam.config import Config, LiveConfig, MotionConfig, SlamConfig
 from contourslam.errors import RecordingError
 from contourslam.geometry.poses import compose
+from contourslam.live.processed import Processed
+from contourslam.live.session import Session
 from contourslam.recordings import RecordingWriter, open_recording
 from contourslam.recordings.picture import Picture
 from contourslam.replay import replay
@@ -69,6 +72,36 @@ def test_a_live_map_gives_the_poses_of_a_recording_and_a_whole_run(run: Simulate
     pose = made.pose()
     assert pose is not None
     assert np.abs(np.array(pose) - run.truth(result.readings.stamps[-1:])[0]).max() < 0.05
+
+
+def test_a_robot_that_is_only_watched_is_followed_and_keeps_nothing(run: SimulatedRun) -> None:
+    taken: list[float] = []
+    begun: list[tuple[object, float]] = []
+
+    class Watching:
+        def take(self, processed: Processed) -> None:
+            taken.append(processed.stamp)
+
+        def rest(self) -> None:
+            """Nothing."""
+
+    def follow(session: Session, mount: NDArray[np.float64]) -> Watching:
+        begun.append((session, float(mount[0])))
+        return Watching()
+
+    patient = LiveConfig(max_waiting=1000)
+    made = LiveMap(SETTINGS, patient, lidar_mount=ROBOT.lidar.mount, onlooker=follow, keeps=False)
+    messages = [m for m in run.messages() if isinstance(m, LaserScan | Odometry)]
+    for message in messages:
+        made.push(message)
+    until, scans = time.monotonic() + 30.0, sum(isinstance(m, LaserScan) for m in messages)
+    while len(taken) < scans - 1 and time.monotonic() < until:
+        time.sleep(0.02)
+    made.close()
+    assert begun == [(made.session, ROBOT.lidar.x)]
+    assert len(taken) >= scans - 1 and made.last is not None and made.last.stamp == taken[-1]
+    assert made.pose() is not None
+    assert made.latencies.size == 0 and made.result().stamps.size == 0  # what would grow with every scan
 
 
 def test_the_mapping_is_told_what_the_robot_is() -> None:

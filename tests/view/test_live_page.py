@@ -136,5 +136,9 @@ def test_on_a_phone_health_fits(watched, opened, wait) -> None:
     page = opened(server, width=360, has_touch=True, color_scheme="dark")
     wait(page, "contourslam.drawn === 19 && document.querySelector('#diagnostics li')")
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    chip = page.evaluate(
+        "(() => { const c = document.querySelector('#state'); return c.scrollWidth <= c.clientWidth; })()"
+    )
+    assert chip and "no such port" in page.inner_text("#trouble")  # the one does not push the other out
     summary = page.locator("#diagnostics summary").first.bounding_box()
     assert summary["height"] >= 24 and summary["x"] + summary["width"] <= 360

@@ -61,7 +61,7 @@ class RobotInTheLoop:
         with Interrupt() as interrupt, ExitStack() as stack, Bar("driving") as bar:
             result = robot_in_the_loop(
                 config, built, recording=recording, progress=bar.to, stopped=lambda: interrupt.requested,
-                witness=None if page is None else page.witness(stack, f"robot in the {self.room}", driven=True),
+                witness=None if page is None else page.witness(stack, self.room.replace("_", " "), driven=True),
             )  # fmt: skip
         written = write_loop_report(self.output, result, command=command)
         if self.json:

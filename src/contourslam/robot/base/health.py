@@ -70,4 +70,5 @@ def base_values(base: MegaBase, state: BaseState) -> dict[str, str]:
 
 def motion_words(state: BaseState) -> str:
     """Say how fast the base goes and turns."""
-    return f"{state.odometry.speed:.2f} m/s, {state.odometry.turn_rate:.2f} rad/s"
+    speed, turn_rate = (round(value, 2) + 0.0 for value in (state.odometry.speed, state.odometry.turn_rate))
+    return f"{speed:.2f} m/s, {turn_rate:.2f} rad/s"
