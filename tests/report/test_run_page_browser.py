@@ -218,6 +218,9 @@ def test_keys_go_from_corner_to_corner_and_each_is_said(opened: Callable[..., An
     assert page.inner_text(f"{MAP} .spoken").startswith(f"Corner c{order[-2]}, ")
     for _ in range(8):
         page.keyboard.press("+")
+    settled(page)
+    at, box = on_screen(page, *run.corner_map.positions[2]), page.locator(f"{MAP} .stage").bounding_box()
+    assert box["x"] < at[0] < box["x"] + box["width"]  # what is held stays in sight
     page.keyboard.press("c")
     settled(page)
     at, box = on_screen(page, *run.corner_map.positions[3]), page.locator(f"{MAP} .stage").bounding_box()
@@ -234,6 +237,7 @@ def test_layers_are_switched_and_what_is_hidden_is_not_found(opened: Callable[..
         before = page.evaluate(display)
         page.click(f'button[data-layer="{layer}"]')
         assert {before, page.evaluate(display)} == {"inline", "none"}, layer
+    assert page.locator(f"{MAP} [data-scale]").is_hidden()  # nothing is left that it explains
     page.mouse.move(*on_screen(page, *run.corner_map.positions[0]))
     assert page.locator(f"{MAP} .card").is_hidden()
 

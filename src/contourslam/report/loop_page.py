@@ -144,8 +144,8 @@ def _way(result: LoopResult, values: RunValues) -> Section:
         facts=map_facts(values, known_then(size)),
     )
     words = paragraph(
-        "Good: the mapped walls lie on the room's, and the robot's own way inside the true one. Where the two ways part, "
-        "everything mapped from there on lies as far off."
+        "Good: the mapped walls lie on the room's, and the robot's own way inside the true one. Where the two ways "
+        "part, all that is mapped from there on lies as far off."
     )
     return Section("way", "Map and way", words + figure)
 

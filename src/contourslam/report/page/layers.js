@@ -14,7 +14,8 @@ class Layers {
       button.setAttribute("aria-pressed", String(this.shown(layer)));
       button.addEventListener("click", () => {
         const shown = !this.shown(layer);
-        for (const part of [entry, this.part(layer)])
+        const scale = panel.parts.scale?.dataset.scale === layer ? [panel.parts.scale] : [];
+        for (const part of [entry, this.part(layer), ...scale])
           if (shown) part.removeAttribute("display"); else part.setAttribute("display", "none");
         button.setAttribute("aria-pressed", String(shown));
         changed();

@@ -104,9 +104,11 @@ class MapFigure {
     this.redraw();
   }
 
-  /** Zoom about a point of the page's px, the middle where none is given. */
+  /** Zoom about a point of the page's px; where none is given, about what is held, or the middle. */
   zoom(by, px, py) {
     const { panel } = this, { view, frame } = panel;
+    const held = this.chosen?.pinned && panel.toPage(...this.members[this.chosen.layer][this.chosen.index][0]);
+    if (px === undefined && held && panel.holds(...held)) [px, py] = held;
     const k = Math.min(CLOSEST, Math.max(0.5, this.closeness() * by)) / this.closeness();
     const [u, v] = panel.toDrawing(px ?? frame.x + frame.w / 2, py ?? frame.y + frame.h / 2);
     panel.view = { x: u - (u - view.x) / k, y: v - (v - view.y) / k, w: view.w / k, h: view.h / k };

@@ -221,8 +221,8 @@ class Axes:
         ]
         return "\n".join(parts)
 
-    def scale(self, label: str, low: float, high: float) -> None:
-        """Draw the scale of the shades, logarithmic from low to high, on the right of the axes."""
+    def scale(self, layer: str, label: str, low: float, high: float) -> None:
+        """Draw the scale of a layer's shades, logarithmic from low to high, on the right of the axes."""
         left, height = self._left + self.width + 16.0, 0.6 * self.height
         top, step = self._top + 0.2 * self.height, 0.6 * self.height / len(SHADES)
         parts = []
@@ -233,7 +233,7 @@ class Axes:
             value = low * (high / low) ** share
             parts.append(_text(left + 17, top + height * (1.0 - share) + 4, f"{value:.2g}", "start"))
         parts.append(_text(left - 8, top - 12, label, "start"))
-        self._outside.append('<g data-scale="">' + "".join(parts) + "</g>")
+        self._outside.append(f'<g data-scale="{layer}">' + "".join(parts) + "</g>")
 
 
 _HIDDEN = ' display="none"'

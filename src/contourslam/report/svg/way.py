@@ -139,7 +139,7 @@ def _draw_loops(axes: Axes, result: RunResult) -> None:
     colours, low, high = shades(np.array([_shift(loop) for loop in loops]))
     axes.segments(ends, colours, 1.6)
     axes.dots(ends[:, 1], colours, 3.0)  # a loop's two poses may lie too near each other for a line to be seen
-    axes.scale("loop shift (m)", low, high)
+    axes.scale("loops", "loop shift (m)", low, high)
 
 
 def error_map_drawing(result: RunResult, stamps: Floats, errors: Floats) -> Drawing:
@@ -163,7 +163,7 @@ def error_map_drawing(result: RunResult, stamps: Floats, errors: Floats) -> Draw
     colours, low, high = shades(errors[order])
     with axes.layer("errors"):
         axes.dots(poses_at(result, stamps[order])[:, :2], colours, 4.4)
-    axes.scale("error (m)", low, high)
+    axes.scale("errors", "error (m)", low, high)
     return drawing([axes], beside=SCALE_WIDTH)
 
 
