@@ -72,6 +72,7 @@ def test_a_given_value_arrives_at_its_setting_and_whole_numbers_do_for_lengths(n
         ({"lidar__sigma_range": -1.0}, "sigma_range must be a positive number"),
         ({"odometry": "wheels"}, "odometry must be"),
         ({"map_period": 0.0}, "map_period must be a positive number"),
+        ({"view_port": 70000}, "view_port must lie between 0 and 65535"),
     ],
 )
 def test_a_wrong_value_is_refused_by_name(node: Callable[..., Node], values: dict[str, Any], named: str) -> None:
