@@ -74,6 +74,12 @@ def test_latex_is_a_booktabs_table_with_the_points_below_each_other() -> None:
     assert second[3] == "--"
 
 
+def test_a_minus_is_one_in_latex_and_a_number_in_csv() -> None:
+    rows = [Row("down", [Cell("-0.5"), Cell("a-b")]), Row("up", [Cell("12"), Cell("–")])]
+    assert body(to_latex("", ("", "x", "y"), rows))[1:] == [["down", "$-$0.5", "a-b"], ["up", r"12\phantom{.0}", "--"]]
+    assert [float(row[1]) for row in read(to_csv(("", "x", "y"), rows))[1:]] == [-0.5, 12.0]
+
+
 def test_braces_and_environments_of_latex_are_closed() -> None:
     nasty = "50 % & #1 $x_2^3$ {a} \\b ~ <c>\n"
     text = to_latex(nasty, (nasty, nasty), [Row(nasty, [Cell(nasty, nasty, better=True)])])

@@ -112,7 +112,7 @@ def _plain(text: str, unit: str) -> str:
 
 def _latex_cell(cell: "Cell", unit: str, places: int, widest: str) -> str:
     found = _WITH_UNIT.fullmatch(cell.text)
-    shown = latex(cell.text.removesuffix(unit).strip() if found else cell.text)
+    shown = latex(cell.text.removesuffix(unit).strip().replace("-", "−") if found else cell.text)
     text = rf"\textbf{{{shown}}}" if cell.better else shown
     if found and found[4] in ("", unit) and (lacking := places - len(found[2] or "")):
         point = "" if found[2] else "."
