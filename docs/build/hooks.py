@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from links import ROOT, rewritten, with_names_linked
+from links import ROOT, rewritten, rewritten_html, with_names_linked
 from mathml import with_mathml
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -41,6 +41,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     return with_names_linked(rewritten(markdown, uri), uri)
 
 
-def on_page_content(html: str, **_: Any) -> str:
-    """Write equations as MathML."""
-    return with_mathml(html)
+def on_page_content(html: str, page: Page, **_: Any) -> str:
+    """Write equations as MathML, and lead the links of the notebook, which comes as HTML."""
+    uri = page.file.src_uri
+    return rewritten_html(html, uri) if uri.endswith(".py") else with_mathml(html)

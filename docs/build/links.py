@@ -25,6 +25,8 @@ PAGE_OF_FOLDER = {"examples": "gallery.md", "src/contourslam": "reference/index.
 
 _FENCED = re.compile(r"^(?P<fence>`{3,}|~{3,}).*?^(?P=fence)`*~*[ ]*$", re.MULTILINE | re.DOTALL)
 _TARGET = re.compile(r"""(\]\(|\bsrc="|\bhref=")([^)"\s]+)""")
+_FOREIGN = re.compile(r"<script\b[^>]*>(?:(?!</script>).)*?https://cdn(?:(?!</script>).)*</script>", re.DOTALL)
+_HREF = re.compile(r"""(\bhref=")([^"\s]+)""")
 _OUTSIDE = re.compile(r"[a-z][a-z0-9+.-]*:|#|/")
 
 
@@ -89,21 +91,24 @@ def files_linked(markdown: str, page: str) -> set[str]:
 
 def rewritten(markdown: str, page: str) -> str:
     """Lead every link of a page to where its target is on the site."""
-    here = posixpath.dirname(page)
+    return outside_of_code(markdown, lambda text: _TARGET.sub(lambda target: _lead(target, page), text))
 
-    def lead(target: re.Match[str]) -> str:
-        if _OUTSIDE.match(target[2]):
-            return target[0]
-        path, hash_mark, anchor = target[2].partition("#")
-        goal = page_of(_in_repository(path, page))
-        goal, _, own_anchor = goal.partition("#")
-        anchor = anchor or own_anchor
-        relative = posixpath.relpath(goal, here or ".")
-        if target[1] == 'href="':  # MkDocs leaves HTML as it is
-            relative = re.sub(r"\.md$", ".html", relative)
-        return target[1] + relative + (f"#{anchor}" if anchor else hash_mark)
 
-    return outside_of_code(markdown, lambda text: _TARGET.sub(lead, text))
+def rewritten_html(html: str, page: str) -> str:
+    """Do the same for a notebook, which was never Markdown here, and take out what it would load from elsewhere."""
+    return _HREF.sub(lambda target: _lead(target, page), _FOREIGN.sub("", html))
+
+
+def _lead(target: re.Match[str], page: str) -> str:
+    if _OUTSIDE.match(target[2]):
+        return target[0]
+    path, hash_mark, anchor = target[2].partition("#")
+    goal, _, own_anchor = page_of(_in_repository(path, page)).partition("#")
+    anchor = anchor or own_anchor
+    relative = posixpath.relpath(goal, posixpath.dirname(page) or ".")
+    if target[1] == 'href="':  # MkDocs leaves HTML as it is
+        relative = re.sub(r"\.md$", ".html", relative)
+    return target[1] + relative + (f"#{anchor}" if anchor else hash_mark)
 
 
 _FULL_NAME = re.compile(r"(?<![\[`])`(contourslam\.[a-z_]+(?:\.[A-Za-z_]\w*)*)`(?!\])")

@@ -43,13 +43,8 @@ def _room_page(name: str) -> str:
     """A package's docstring with those of its modules; packages inside it have pages of their own."""
     modules = sorted(ROOT.joinpath("src", *name.split(".")).glob("*.py"))
     inner = [f"{name}.{path.stem}" for path in modules if not path.stem.startswith("_")]
-    parts = [
-        f"# {name}",
-        f"::: {name}\n    options: {{show_submodules: false}}" if inner else f"::: {name}",
-    ]
-    for module in inner:
-        parts += [f"::: {module}\n    options: {{show_root_heading: true, show_root_toc_entry: true}}"]
-    return "\n\n".join(parts) + "\n"
+    whole = f"::: {name}\n    options: {{heading_level: 1, show_submodules: false}}"
+    return "\n\n".join([whole, *(f"::: {module}" for module in inner)]) + "\n"
 
 
 def _dotted(path: Path) -> str:
