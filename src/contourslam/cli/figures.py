@@ -9,8 +9,6 @@ from contourslam.cli.console import keep_apart, note, prepare_folder, print_json
 from contourslam.cli.options import Json, Output, Overwrite
 from contourslam.errors import ConfigError
 
-_COLUMNS = {"single": 3.5, "double": 7.16}  # inches, as IEEE's journals have them
-
 
 @dataclass(frozen=True)
 class Figures:
@@ -61,8 +59,10 @@ class Figures:
         return 0
 
     def _inches(self) -> float:
+        from contourslam.report.figures.style import DOUBLE, SINGLE
+
         try:
-            width = _COLUMNS.get(self.width) or float(self.width)
+            width = {"single": SINGLE, "double": DOUBLE}.get(self.width) or float(self.width)
         except ValueError:
             width = 0.0
         if not 1.5 <= width <= 20.0:
