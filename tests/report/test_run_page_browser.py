@@ -311,7 +311,10 @@ def test_dark_or_light_is_the_systems_until_it_is_switched_and_paper_is_always_l
     assert page.evaluate(sheet) == dark
     page.click("button.theme")
     assert page.evaluate(paper) == "rgb(255, 255, 255)"
+    end = time.monotonic() + 20.0
     page.reload()
+    while page.evaluate(paper) == dark and time.monotonic() < end:  # a busy browser may write it down a little later
+        page.reload()
     assert page.evaluate(paper) == page.evaluate(sheet) == "rgb(255, 255, 255)"  # it is remembered
     page.click("button.theme")
     assert page.evaluate(paper) == dark
@@ -411,13 +414,19 @@ def test_a_run_in_which_nothing_happened_has_a_page_that_answers(
         page.keyboard.press(key)
 
 
-def test_every_figure_can_be_reached_and_named_without_a_mouse(opened: Callable[..., Any]) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
-    for scheme in ("light", "dark"):
-        page = opened(color_scheme=scheme)
-        found = axe.Axe().run(page).response["violations"]
-        assert [(one["id"], one["nodes"][0]["html"]) for one in found] == []
-        for name in page.evaluate(FIGURES):
-            stage = page.locator(f'figure[data-name="{name}"] .stage')
-            stage.focus()
-            assert stage.get_attribute("aria-label")
+def test_every_figure_and_control_can_be_reached_by_keys_and_has_a_name(opened: Callable[..., Any]) -> None:
+    page = opened()
+    nameless = "[...document.querySelectorAll('button')].filter((b) => !(b.ariaLabel || b.textContent.trim())).length"
+    assert page.evaluate(nameless) == 0
+    reached, labels = set(), set()
+    for _ in range(80):
+        page.keyboard.press("Tab")
+        figure, label = page.evaluate(
+            "(() => { const one = document.activeElement;"
+            "return [one.matches('.stage') ? one.closest('figure').dataset.name : '', one.ariaLabel]; })()"
+        )
+        if figure:
+            reached.add(figure)
+            labels.add(label)
+    assert reached == set(page.evaluate(FIGURES))
+    assert all(re.match("(Map|Chart): ", label) for label in labels)

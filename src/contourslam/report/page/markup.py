@@ -39,7 +39,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture, with the words for those who cannot see it: a file beside the page, or the page's own (``data:``).
+    """A picture, with the words for those who cannot see it: a file beside the page.
 
     `others` are files of the same picture in other formats.
     """
@@ -70,7 +70,7 @@ def paragraph(text: str, kind: str = "") -> str:
 
 def table(caption: str, headers: Sequence[str], rows: Sequence[Row]) -> str:
     """Give a table with a caption and header cells, to be copied as CSV or LaTeX; it scrolls where it is too wide."""
-    head = "".join(f'<th scope="col">{escape(header)}</th>' for header in headers)
+    head = "".join(f'<th scope="col">{escape(header)}</th>' if header else "<td></td>" for header in headers)
     body = "\n".join(_row(row) for row in rows)
     return (
         f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
@@ -105,8 +105,7 @@ def figure(picture: Picture) -> str:
         f'<img class="{kind}" src="{source}" width="{picture.width}" height="{picture.height}" '
         f'alt="{escape(picture.alt)}">'
     )
-    if not picture.source.startswith("data:"):  # browsers refuse to open these by themselves
-        image = f'<a href="{source}">{image}</a>'
+    image = f'<a href="{source}">{image}</a>'
     links = "".join(
         f' <a href="{escape(other)}">{escape(other.rpartition(".")[2].upper())}</a>' for other in picture.others
     )
