@@ -134,6 +134,12 @@ def test_scans_responses_and_times_are_there(logged) -> None:
     np.testing.assert_allclose(np.sort(stamps) * 1e-9, result.stamps, atol=1e-9)
 
 
+def test_the_file_carries_its_layout(logged) -> None:
+    from rerun.chunk import RrdReader
+
+    assert len(RrdReader(str(logged[0])).blueprints()) >= 1
+
+
 def test_loops_and_what_was_skipped_are_told_at_their_scans(drive, tmp_path) -> None:
     path = tmp_path / "loops.rrd"
     log = open_log(path, "circle", Config(), [LANE])

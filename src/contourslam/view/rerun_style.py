@@ -75,7 +75,9 @@ def lay_out(file: RerunFile, names: Sequence[str], middle: Floats, half: float, 
     truth : bool
         Whether the true poses are known.
     """
-    maps = [_map_view(name, middle, half) for name in names]
+    high = half * (4.0 if len(names) == 2 else 2.4)  # two stand side by side, and are narrow
+    maps = [_map_view(name, middle, high) for name in names]
+    scans = [_scan_view(name) for name in names]
     plots = [
         rrb.TimeSeriesView(origin="plots/nis", name="NIS / degrees of freedom"),
         rrb.TimeSeriesView(origin="plots/sigma", name="sigma of the position (m)"),
@@ -85,7 +87,8 @@ def lay_out(file: RerunFile, names: Sequence[str], middle: Floats, half: float, 
         rrb.TextLogView(origin="log", name="loops, and what was skipped"),
         *[rrb.TimeSeriesView(origin=f"plots/stages/{name}", name=f"ms per scan, {name}") for name in names],
     )
-    beside = rrb.Vertical(_scan_view(names[0]), *plots, more, row_shares=[2.4, *[1.0] * len(plots), 1.2])
+    scan = rrb.Tabs(*scans) if len(scans) > 1 else scans[0]
+    beside = rrb.Vertical(scan, *plots, more, row_shares=[2.4, *[1.0] * len(plots), 1.2])
     blueprint = rrb.Blueprint(
         rrb.Horizontal(rrb.Grid(*maps) if len(maps) > 1 else maps[0], beside, column_shares=[1.7, 1.0]),
         rrb.TimePanel(state="collapsed", timeline=STAMP),
@@ -94,7 +97,7 @@ def lay_out(file: RerunFile, names: Sequence[str], middle: Floats, half: float, 
     file.lay_out(blueprint)
 
 
-def _map_view(name: str, middle: Floats, half: float) -> rrb.Spatial3DView:
+def _map_view(name: str, middle: Floats, high: float) -> rrb.Spatial3DView:
     x, y = (float(value) for value in middle)
     so_far = rrb.VisibleTimeRanges(
         [rrb.VisibleTimeRange(timeline, start=_BEGINNING, end=_NOW) for timeline in (STAMP, SCAN)]
@@ -106,7 +109,7 @@ def _map_view(name: str, middle: Floats, half: float) -> rrb.Spatial3DView:
         contents=[f"+ /world/{name}/**", "+ /world/odometry", "+ /world/truth", f"- /world/{name}/look/response/**"],
         overrides={way: [so_far] for way in ways},
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=(x, y, 2.4 * half), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
+            kind=rrb.Eye3DKind.Orbital, position=(x, y, high), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
         ),
         line_grid=False,
     )
