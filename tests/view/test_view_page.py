@@ -63,7 +63,8 @@ def test_four_detectors_stand_side_by_side(served, opened, wait, inked) -> None:
 def test_the_time_line_goes_back_at_once_and_play_goes_on_from_there(served, opened, wait) -> None:
     one, server = served(60, pace=Pace(math.inf))
     page = opened(server)
-    wait(page, f"{STATE} === 'finished' && contourslam.model.frame?.index === 59")
+    # The time line has its length once the frame is drawn.
+    wait(page, f"{STATE} === 'finished' && contourslam.drawn === 59 && document.querySelector('#time').max > 10")
     one.pace.pause()
     page.evaluate("const s = document.querySelector('#time'); s.value = 2.0; s.dispatchEvent(new Event('input'))")
     began = time.monotonic()
