@@ -1,7 +1,6 @@
 """The blocks of the documents that can be run, and what they need to be there."""
 
 import re
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +13,8 @@ DOCUMENTS = sorted(
 )
 """Every document that becomes a page of the site."""
 
-ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "with the firmware")
-"""Titles of blocks that cannot be run here: their commands are only held against the real parser."""
+ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "with the firmware", "minutes")
+"""Titles of blocks that cannot be run here, or take too long: their commands are only held against the real parser."""
 SERVES = "until Ctrl-C"
 """Title of a block whose commands serve until Ctrl-C."""
 ONCE = "once"
@@ -49,7 +48,7 @@ class Block:
     def lines(self) -> list[str]:
         """Commands of a block of the shell, one each, lines that go on joined."""
         joined = re.sub(r"\\\n\s*", " ", self.text)
-        return [line for line in joined.splitlines() if shlex.split(line, comments=True, posix=False)]
+        return [line for line in joined.splitlines() if line.strip() and not line.lstrip().startswith("#")]
 
 
 def blocks(document: Path) -> list[Block]:

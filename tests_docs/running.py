@@ -74,7 +74,9 @@ def serve_line(line: str, folder: Path) -> str:
         code = process.wait(LIMIT)
     finally:
         process.kill()
-    reader.join(10.0)
+        process.wait()
+        reader.join(10.0)
+        process.stdout.close()
     while not lines.empty():
         said += lines.get()
     assert code in (0, 130), f"{line}\nexit code {code}\n{said}"
