@@ -8,9 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
 
 from contourslam.config import Config, GraphConfig
 from contourslam.errors import MissingExtraError
+from contourslam.geometry.angles import wrap
 from contourslam.geometry.poses import between, compose
 from contourslam.replay import BLIND, make_mapper, replay
 from contourslam.scan import LaserScan, Odometry, TruePose
@@ -87,6 +89,19 @@ def test_finish_gives_each_scan_a_pose_that_knows_what_came_after() -> None:
     change = between(result.online_poses, result.poses)
     assert np.abs(change).max() > 1e-3
     assert len(result.quality if result.quality is not None else ()) == scans
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_first_seconds_are_as_honest_as_the_rest(seed: int) -> None:
+    """The map begins at the first keyframe, which is known exactly; the scans that follow it are not."""
+    begun = building_drive(3.0, seed)
+    result = replay(begun.messages(), CONFIG, lidar_mount=begun.lidar_mount)
+    assert result.truth is not None
+    error = result.poses - result.truth
+    error[:, 2] = wrap(error[:, 2])
+    nees = np.einsum("ti,tij,tj->t", error, np.linalg.inv(result.covariances), error)[1:]
+    assert nees.mean() < 3.0  # of three dimensions; it was hundreds
+    assert (nees < chi2.ppf(0.99999, 3)).all()
 
 
 @pytest.mark.parametrize("refine", [False, True], ids=["as_it_is", "refined"])

@@ -212,7 +212,10 @@ class GraphSlam:
             poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
             self.settled = Settled(poses, marginals, factors)
             still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map
-            covariances = [moved(poses[key], marginals[key], seen, still)[1] for key, seen, _ in self._scans]
+            covariances = [  # but for the first keyframe, which is known exactly, for the map begins there
+                known if key == 0 else moved(poses[key], marginals[key], seen, still)[1]
+                for key, seen, known in self._scans
+            ]
         else:
             poses = poses_of(self._graph.estimate(count), count)
         return Finished(self._along(poses), np.array(covariances), self.loops())
