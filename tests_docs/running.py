@@ -95,7 +95,7 @@ def check_install(line: str) -> None:
 
 def check_line(line: str) -> None:
     """Hold a line that is not run against what there is: parser, launch files, targets, paths."""
-    for part in re.split(r"&&|\|\||\||;", _without_comment(line)):
+    for part in re.split(r"&&|\|\||\||;", re.sub(r"\s>\s*\S+", "", _without_comment(line))):
         words = shlex.split(part)
         if words[:1] == ["sudo"]:
             words = words[1:]

@@ -125,5 +125,10 @@ def test_a_map_in_the_format_of_nav2_is_what_another_reader_takes_it_for(everyth
 
 
 def test_the_report_is_read_by_its_page(everything: Newcomer, made: Made) -> None:
-    folder = everything.follow("docs/how_to/reading_the_report.md", made)
-    assert list(folder.rglob("index.html"))
+    page = "docs/how_to/reading_the_report.md"
+    folder = everything.follow(page, made)
+    reports = " ".join(path.read_text() for path in folder.rglob("index.html")).lower()
+    tiles = re.findall(r"^\| (?:error in x, y, heading|(.+?)) \|", (everything.clone / page).read_text(), re.MULTILINE)
+    named = tiles[2 : tiles.index("scans a second") + 1]
+    assert len(named) > 4
+    assert [name for name in named if name.lower() not in reports] == []
