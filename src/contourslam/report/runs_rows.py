@@ -96,7 +96,7 @@ MEASURES = (
     Measure("raw odometry's relation error, mean", "m", ("odometry_relations", "translation", "mean"), 4),
     Measure("raw odometry's rel. error, rotation, mean", "deg", ("odometry_relations", "rotation", "mean"), 3),
     Measure("pose NEES (ideal 3)", "", ("nees",), 2),
-    Measure("NIS per degree of freedom (ideal 1)", "", ("nis",), 2),
+    Measure("NIS per degree of freedom", "", ("nis",), 2),
     Measure("loops closed", "", ("loops",)),
     Measure("quality of the contour matching", "", ("quality",), 3),
     Measure("false-negative rate of corners", "", ("fnr",), 3, True),

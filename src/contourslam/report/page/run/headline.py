@@ -37,7 +37,8 @@ def headline(values: RunValues) -> str:
     if metrics.get("quality") is not None:
         shown.append((f"{metrics['quality']:.2f}", "matching quality", "mean; 1 is the best"))
     if metrics.get("nis") is not None:
-        shown.append((f"{metrics['nis']:.2f}", "NIS per degree of freedom", "1 is ideal"))
+        beside = "of contours against wheels; small is good" if values.result.back_end == "graph" else "1 is ideal"
+        shown.append((f"{metrics['nis']:.2f}", "NIS per degree of freedom", beside))
     if metrics.get("scans_per_second"):
         shown.append((f"{metrics['scans_per_second']:,.0f}", "scans a second", "on one core"))
     return tiles(shown)

@@ -5,6 +5,18 @@ from contourslam.report.page.markup import Section, paragraph
 from contourslam.report.page.run.values import RunValues
 from contourslam.report.svg.series import matching_drawing
 
+_NIS = (
+    (
+        "NIS: the innovation of the landmarks against what the filter expected, per degree of freedom.",
+        "A good NIS scatters about 1; for long far above, the filter is too sure, far below, too cautious.",
+    ),
+    (
+        "NIS: how far the contours take the pose from where the wheels had it, per degree of freedom.",
+        "NIS is small where the wheels are good, for they are taken for worse than that; where it rises, wheels slip, "
+        "and where it is high from the first turn, the lidar is not where it is said to be, or the clocks differ.",
+    ),
+)  # of the filter, of the graph
+
 
 def section(values: RunValues) -> Section | None:
     """Give the section; None where nothing was matched."""
@@ -16,8 +28,9 @@ def section(values: RunValues) -> Section | None:
         good.append("Good matching stays near 1; where it falls for long, the scans saw little that they knew.")
         said.append("Quality: how well each scan's contours fitted the local map, 0 where nothing matched.")
     if corrected:
-        good.append("A good NIS scatters about 1; for long far above, the filter is too sure, far below, too cautious.")
-        said.append("NIS: the innovation of the landmarks against what the filter expected, per degree of freedom.")
+        what, how = _NIS[values.result.back_end == "graph"]
+        good.append(how)
+        said.append(what)
     good.append("The stated σ should fall where known places are seen again, and not grow without end.")
     said.append("Position σ: the larger axis of what the estimate states of itself.")
     figure = drawn(
