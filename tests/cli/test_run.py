@@ -84,6 +84,23 @@ def test_the_map_of_a_known_room_is_right(log: Path, tmp_path: Path) -> None:
         assert distances.min() < 0.02
 
 
+@pytest.mark.skipif(not GRAPH, reason="the graph needs GTSAM, the extra `graph`")
+@pytest.mark.parametrize(
+    ("options", "doubt"),
+    [
+        ([], ""),
+        (["--sigma-range", "0.001"], "there is no corner in the map: the lidar's noise may not be the 0.001 m"),
+        (["--mount-yaw", "3.1416"], "wheels and contours disagree (NIS "),
+    ],
+)
+def test_what_looks_like_a_wrong_setting_is_said(
+    options: list[str], doubt: str, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(log), "-o", str(tmp_path), *options]) == 0
+    said = capsys.readouterr().err
+    assert doubt in said if doubt else said == ""
+
+
 def test_the_back_end_is_the_graph_where_gtsam_is_and_the_reason_is_said(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,6 +28,9 @@ DEFAULTS = Config(
 """The graph closes loops and so is the better one wherever GTSAM is installed. The filter gets what serves it on real
 logs: walls, because corners alone are too few, and contour matching, because wheels slip."""
 
+_ENOUGH, _MATCHED = 50, 0.8  # scans and their mean quality, from which a map without a corner is odd
+_APART = 5.0  # NIS of the graph: wheels that are right give below 2, a lidar that looks backwards 20
+
 
 @dataclass(frozen=True)
 class Run(Reading):
@@ -99,7 +102,7 @@ class Run(Reading):
         if len(result.stamps):
             metrics = work.write(result, {"back_end_reason": _reason(settings)}, command)
             continued.keep(self.output / "map.cmap", self.recording.name)
-            for text in continued.notes:
+            for text in (*continued.notes, *_doubts(metrics, settings)):
                 note(text)
             _tell(self, metrics)
         if trouble:
@@ -121,6 +124,22 @@ def _reason(settings: Config) -> str:
     if _GRAPH:
         return "the default, for GTSAM is installed"
     return "GTSAM is not installed: `pip install 'contourslam[graph]'` brings the graph, which closes loops"
+
+
+def _doubts(metrics: dict[str, Any], settings: Config) -> list[str]:
+    """Say what looks as if a setting were wrong, where the map alone would not show it."""
+    doubts = []
+    if metrics["scans"] >= _ENOUGH and (metrics["quality"] or 0.0) > _MATCHED and not metrics["landmarks"]["corners"]:
+        doubts.append(
+            "scans match well, yet there is no corner in the map: the lidar's noise may not be the "
+            f"{settings.lidar.sigma_range:g} m of --sigma-range (docs/how_to/tuning.md measures it)"
+        )
+    if settings.back_end == "graph" and (metrics["nis"] or 0.0) > _APART:
+        doubts.append(
+            f"wheels and contours disagree (NIS {metrics['nis']:.1f}): is the lidar where --mount-x, --mount-y and "
+            "--mount-yaw or the recording have it, and the odometry sound? --ignore-odometry goes by the scans alone"
+        )
+    return doubts
 
 
 def _tell(options: Run, metrics: dict[str, Any]) -> None:
