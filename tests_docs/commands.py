@@ -20,6 +20,9 @@ SERVES = "until Ctrl-C"
 ONCE = "once"
 """Title of a block that installs: the newcomer's tests do that."""
 
+FOLLOWED = tuple(f"docs/how_to/{name}.md" for name in ("own_detector", "nav2", "reading_the_report"))
+"""Documents whose blocks a newcomer runs in a clone of his own: once is enough."""
+
 _BLOCK = re.compile(
     r"^(?P<indent> *)```(?P<kind>bash|python)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,

@@ -4,11 +4,18 @@ import re
 from pathlib import Path
 
 import pytest
-from commands import DOCUMENTS, ELSEWHERE, ONCE, ROOT, SERVES, blocks, needs
+from commands import DOCUMENTS, ELSEWHERE, FOLLOWED, ONCE, ROOT, SERVES, blocks, needs
 from made import Made
 from running import check_install, check_line, check_make, run_line, run_python, serve_line
 
-RUN = [document for document in DOCUMENTS if any(block.run for block in blocks(document))]
+THEORY = ROOT / "docs" / "theory"  # tests/test_theory.py runs it, and holds what it prints against the page
+RUN = [
+    document
+    for document in DOCUMENTS
+    if any(block.run for block in blocks(document))
+    and document.parent != THEORY
+    and document.relative_to(ROOT).as_posix() not in FOLLOWED
+]
 CLONE = re.compile(r"git clone |\.ci/run")
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import blocks, needs
+from commands import FOLLOWED, blocks, needs
 from made import Made
 
 pytestmark = pytest.mark.xdist_group("newcomer")  # one environment for all of them
@@ -45,6 +45,7 @@ class Newcomer:
 
     def follow(self, document: str, made: Made) -> Path:
         """Do what a document's blocks say, in an empty folder, which is returned."""
+        assert document in FOLLOWED  # or its commands would be run twice
         page = self.clone / document
         folder = self.home / page.stem
         folder.mkdir()
