@@ -7,8 +7,6 @@ from typing import Literal
 
 import tyro
 
-SHELLS = ("bash", "zsh", "tcsh")
-
 
 @dataclass(frozen=True)
 class Completion:
@@ -38,7 +36,7 @@ def script(shell: str) -> str:
     Parameters
     ----------
     shell : str
-        One of `SHELLS`.
+        "bash", "zsh" or "tcsh".
 
     Returns
     -------

@@ -47,8 +47,17 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at everything, in the order in which it is told."""
-    parts: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _extras, _devices, _ros, _work)
-    return [finding for part in parts for finding in part()]
+    parts: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _extras, _devices, _ros, _room, _test)
+    return [finding for part in parts for finding in _guarded(part)]
+
+
+def _guarded(part: Callable[[], Iterator[Finding]]) -> Iterator[Finding]:
+    """Whatever goes wrong in one part is a finding too: the others are to be told with it."""
+    try:
+        yield from part()
+    except Exception as error:
+        told = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        yield Finding("work", "wrong", f"{part.__name__.strip('_')} cannot be examined: {told}", "please report this")
 
 
 def _python() -> Iterator[Finding]:
@@ -64,7 +73,8 @@ def _python() -> Iterator[Finding]:
         yield Finding(
             group, "wrong", f"not installed: {', '.join(missing)}", "pip install --force-reinstall contourslam"
         )
-    yield Finding(group, "good", ", ".join(f"{name} {version}" for name, version in found.items() if version))
+    if len(missing) < len(found):
+        yield Finding(group, "good", ", ".join(f"{name} {version}" for name, version in found.items() if version))
 
 
 def _requirements() -> list[str]:
@@ -150,16 +160,15 @@ def _ros() -> Iterator[Finding]:
         yield Finding("ROS 2", "good", "contourslam_ros is here")
 
 
-def _work() -> Iterator[Finding]:
-    yield _room()
-    yield from _test()
-
-
-def _room() -> Finding:
-    with tempfile.TemporaryDirectory() as folder:
-        free = shutil.disk_usage(folder).free / 1e9
-    text = f"{free:.1f} GB free for temporary files"
-    return Finding("work", "good", text) if free > _ROOM else Finding("work", "absent", text, "make room first")
+def _room() -> Iterator[Finding]:
+    try:
+        folder = tempfile.gettempdir()
+    except FileNotFoundError as error:
+        yield Finding("work", "absent", f"no folder for temporary files: {error.strerror}", "name one in TMPDIR")
+        return
+    free = shutil.disk_usage(folder).free / 1e9
+    text = f"{free:.1f} GB free for temporary files in {folder}"
+    yield Finding("work", "good", text) if free > _ROOM else Finding("work", "absent", text, "make room first")
 
 
 class _ColdError(ContourslamError):
@@ -184,9 +193,6 @@ def _test() -> Iterator[Finding]:
     except _ColdError:
         advice = "`contourslam warm-up` compiles them now, in a minute or two; the first run would else; then ask again"
         yield Finding("work", "absent", f"kernels are not compiled yet (they are kept in {cache_folder()})", advice)
-        return
-    except Exception as error:  # whatever it is, the rest of the findings is to be told with it
-        yield Finding("work", "wrong", f"the self-test failed: {type(error).__name__}: {error}", "please report this")
         return
     yield Finding("work", "good", f"kernels are compiled, in {cache_folder()}")
     rate = test.scans / max(test.seconds, 1e-9)

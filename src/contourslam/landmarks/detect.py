@@ -175,7 +175,7 @@ def find_corners(
     ScanError
         If the arrays differ in shape, or an angle is not finite.
     ConfigError
-        If there is no such detector.
+        If there is no such detector, or `sigma_range` is not above 0.
     """
     values, directions = np.asarray(ranges, dtype=np.float64), np.asarray(angles, dtype=np.float64)
     scan = LaserScan(0.0, directions, values, np.zeros(directions.shape), 0.0, np.inf)
