@@ -59,6 +59,48 @@ def test_a_file_that_is_there_is_kept(log: Path, tmp_path: Path, failure: Failur
     assert file.read_text() == "mine"
 
 
+@needs_rerun
+def test_an_earlier_file_is_taken_away_only_once_all_else_works(log: Path, tmp_path: Path, failure: Failure) -> None:
+    file = tmp_path / "mine.rrd"
+    file.write_text("mine")
+    again = ("view", log, "--rerun", file, "--overwrite")
+    assert "each once" in failure(*again, "--detectors", "wu,wu")
+    assert "cannot be served" in failure(*again, "--host", "203.0.113.7", "--port", "0")
+    assert file.read_text() == "mine"
+
+
+@needs_rerun
+def test_a_file_that_fails_costs_nothing_of_the_run(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import rerun as rr
+
+    def refuse(self: rr.RecordingStream, *values: object, **named: object) -> None:
+        raise ValueError("nobody foresaw this")
+
+    monkeypatch.setattr(rr.RecordingStream, "send_columns", refuse)
+    out, file = tmp_path / "out", tmp_path / "x.rrd"
+    assert main(["run", str(log), "-o", str(out), "--rerun", str(file), "--max-scans", "10"]) == 1
+    assert (out / "index.html").is_file() and (out / "map.cmap").is_file()
+    said = capsys.readouterr()
+    assert "x.rrd: ends early" in said.err and "10 scans" in said.out
+
+
+@needs_rerun
+def test_a_page_whose_file_fails_ends_with_code_1(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from contourslam.view.rerun_log import RerunLog
+
+    def refuse(self: RerunLog, *values: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)  # who watches has seen enough
+        raise ValueError("nobody foresaw this")
+
+    monkeypatch.setattr(RerunLog, "add", refuse)
+    assert main(["view", str(log), "--port", "0", "--rerun", str(tmp_path / "x.rrd")]) == 1
+    assert "nobody foresaw this" in capsys.readouterr().err
+
+
 def test_without_its_library_the_extra_is_named(
     log: Path, tmp_path: Path, failure: Failure, monkeypatch: pytest.MonkeyPatch
 ) -> None:

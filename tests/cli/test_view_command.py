@@ -47,6 +47,8 @@ def test_it_serves_the_page_until_ctrl_c_and_then_ends_well(log: Path) -> None:
         (["--speed", "0"], "--speed must be above 0"),
         (["--port", "70000"], "--port must lie"),
         (["--host", "203.0.113.7", "--port", "0"], "cannot be served at 203.0.113.7"),
+        (["--host", "203.0.113.7", "--port", "0"], "choose another --host, or another --port"),
+        (["--overwrite"], "--overwrite replaces the file of --rerun"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(
@@ -61,6 +63,7 @@ def test_a_recording_or_the_robot_is_wanted_and_not_both(log: Path, failure: Cal
     assert "leave it out for a recording" in failure("view", log, "--robot", "robot.yaml")
     said = failure("view", "--live", "--paused", "--detectors", "wu", "--scan-topic", "scan")
     assert "--detectors and --paused and --scan-topic are for recordings" in said
+    assert "--overwrite are for recordings" in failure("view", "--live", "--overwrite")
     assert "robot.yaml: cannot be read" in failure("view", "--live", "--robot", "robot.yaml")
     assert "cannot be served at 203.0.113.7" in failure("view", "--live", "--host", "203.0.113.7", "--port", "0")
 

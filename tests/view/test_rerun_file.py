@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import time
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,10 +18,11 @@ from contourslam.slam.result import Loop
 
 pytest.importorskip("rerun.chunk")
 
+from contourslam.view.lane import Lane
 from contourslam.view.rerun_file import RerunFile
 from contourslam.view.rerun_log import RerunLog
 from contourslam.view.rerun_rows import ellipses, nis_bounds
-from contourslam.view.rerun_watch import Copied, WatchedRun, open_log
+from contourslam.view.rerun_watch import Logged, LoggedRun, open_log
 
 BACK_ENDS = ["ekf", pytest.param("graph", marks=pytest.mark.skipif(find_spec("gtsam") is None, reason="no GTSAM"))]
 LANE = "matched_filter"
@@ -48,9 +50,9 @@ def rows(path: Path, entity: str, component: str) -> dict[int, np.ndarray]:
 
 def run(messages, config: Config, path: Path):
     log = open_log(path, "circle", config, [config.detector])
-    watched = WatchedRun(log)
-    result = replay(messages, config, make=watched.making(make_mapper), on_scan=watched.on_scan)
-    return result, watched.finish(result)
+    logging = LoggedRun(log)
+    result = replay(messages, config, make=logging.making(make_mapper), on_scan=logging.on_scan)
+    return result, logging.finish(result)
 
 
 @pytest.fixture(scope="module", params=BACK_ENDS)
@@ -143,17 +145,17 @@ def test_the_file_carries_its_layout(logged) -> None:
 def test_loops_and_what_was_skipped_are_told_at_their_scans(drive, tmp_path) -> None:
     path = tmp_path / "loops.rrd"
     log = open_log(path, "circle", Config(), [LANE])
-    watched = WatchedRun(log)
+    logging = LoggedRun(log)
     loop = Loop(100.2, 101.0, np.zeros(3), np.eye(3), np.array([0.3, 0.4, 0.0]), "search", 34, 0.02, 0.9, 0.1)
 
     def on_scan(scan, update) -> None:
-        if len(watched._lane.loops) == 0 and scan.stamp > 101.1:
-            watched._lane.loops.append(loop)
-        watched.on_scan(scan, update)
+        if len(logging._lane.loops) == 0 and scan.stamp > 101.1:
+            logging._lane.loops.append(loop)
+        logging.on_scan(scan, update)
 
     messages = list(drive(8))[1:]  # the first odometry is missing
-    result = replay(messages, Config(), make=watched.making(make_mapper), on_scan=on_scan)
-    assert watched.finish(result) == ""
+    result = replay(messages, Config(), make=logging.making(make_mapper), on_scan=on_scan)
+    assert logging.finish(result) == ""
     told = rows(path, f"log/{LANE}", "TextLog:text")
     assert list(told) == [6]
     assert "0.50 m and 0.0° off, by search, 34 pairs" in str(told[6])
@@ -172,12 +174,12 @@ def test_a_page_and_a_file_show_the_same_lanes(replayed, tmp_path) -> None:
     names = ("matched_filter", "wu")
     path = tmp_path / "both.rrd"
     log = open_log(path, "circle", Config(), names)
-    copied = Copied(log, len(names))
-    one = replayed(20, names, memory=copied)
-    copied.follow(one.player)
+    logged = Logged(log)
+    one = replayed(20, names)
+    one.player.on_moment = logged.take
     one.player.run()
     assert one.player.error is None
-    assert copied.finish({}) == ""
+    assert logged.finish({}) == ""
     for name, lane in zip(names, one.player.lanes, strict=True):
         found = rows(path, f"plots/pose/x/{name}", "Scalars:scalars")
         assert list(found) == list(range(20))
@@ -190,9 +192,9 @@ def test_a_file_that_is_never_ended_holds_what_was_written(drive, tmp_path) -> N
     """As after `kill -9`."""
     path = tmp_path / "cut.rrd"
     log = open_log(path, "circle", Config(), [LANE])
-    watched = WatchedRun(log)
+    logging = LoggedRun(log)
     log.file.scan_done = lambda index: log.file.write()  # as if a batch were one scan
-    replay(drive(5), Config(), make=watched.making(make_mapper), on_scan=watched.on_scan)
+    replay(drive(5), Config(), make=logging.making(make_mapper), on_scan=logging.on_scan)
     copy = tmp_path / "copy.rrd"
     copy.write_bytes(path.read_bytes())
     warnings.simplefilter("ignore")  # that it has no end
@@ -203,7 +205,7 @@ def test_a_file_that_is_never_ended_holds_what_was_written(drive, tmp_path) -> N
 def test_a_disk_that_is_full_ends_the_file_and_not_the_run(drive, tmp_path, monkeypatch) -> None:
     path = tmp_path / "full.rrd"
     log = open_log(path, "circle", Config(), [LANE])
-    watched = WatchedRun(log)
+    logging = LoggedRun(log)
     log.file.scan_done = lambda index: log.file.write()
 
     class Full:
@@ -214,9 +216,62 @@ def test_a_disk_that_is_full_ends_the_file_and_not_the_run(drive, tmp_path, monk
             raise RuntimeError("File-writer thread shut down prematurely")
 
     stream, log.file.stream = log.file.stream, Full()
-    result = replay(drive(5), Config(), make=watched.making(make_mapper), on_scan=watched.on_scan)
+    result = replay(drive(5), Config(), make=logging.making(make_mapper), on_scan=logging.on_scan)
     assert len(result.stamps) == 5
-    assert "could not be written on" in watched.finish(result)
+    assert "could not be written on" in logging.finish(result)
+
+
+@pytest.mark.parametrize("what", ["send_columns", "send_blueprint", "log", "disconnect"])
+def test_whatever_fails_in_the_sdk_ends_the_file_and_not_the_run(drive, tmp_path, what: str) -> None:
+    log = open_log(tmp_path / "x.rrd", "circle", Config(), [LANE])
+    logging = LoggedRun(log)
+    log.file.scan_done = lambda index: log.file.write()
+
+    class Broken:
+        def __getattr__(self, name):
+            return refuse if name == what else getattr(stream, name)
+
+    def refuse(*values, **named):
+        raise ValueError("nobody foresaw this")
+
+    stream, log.file.stream = log.file.stream, Broken()
+    result = replay(drive(5), Config(), make=logging.making(make_mapper), on_scan=logging.on_scan)
+    assert len(result.stamps) == 5
+    assert "nobody foresaw this" in logging.finish(result)
+    stream.disconnect()
+
+
+def test_a_page_goes_on_where_its_file_cannot(replayed, tmp_path, monkeypatch) -> None:
+    logged = Logged(open_log(tmp_path / "x.rrd", "circle", Config(), [LANE]))
+    one = replayed(5)
+    one.player.on_moment = logged.take
+    monkeypatch.setattr(RerunLog, "add", lambda self, moment, lanes: {}["unforeseen"])
+    one.player.run()
+    assert (one.player.error, one.player.state) == (None, "finished")
+    assert "unforeseen" in logged.finish({})
+
+
+def test_the_times_of_the_stages_are_those_of_the_run(drive, tmp_path, monkeypatch) -> None:
+    """What is done between two scans, here reading as slowly as anything, is in none."""
+    summed: dict[str, float] = {}
+    take = Lane.take
+
+    def counting(self, update, seconds, elapsed, **more):
+        for stage, spent in seconds.items():
+            summed[stage] = summed.get(stage, 0.0) + spent
+        return take(self, update, seconds, elapsed, **more)
+
+    def slowly():
+        for message in drive(12):
+            until = time.thread_time() + 0.01
+            while time.thread_time() < until:
+                pass
+            yield message
+
+    monkeypatch.setattr(Lane, "take", counting)
+    result, _ = run(slowly(), Config(back_end="ekf"), tmp_path / "x.rrd")
+    assert summed == pytest.approx({stage: result.seconds[stage] for stage in summed}, abs=1e-9)
+    assert set(result.seconds) - set(summed) == {"map", "map refinement"}
 
 
 def test_what_cannot_be_written_is_said_at_once(tmp_path) -> None:
@@ -235,16 +290,19 @@ def test_what_cannot_be_written_is_said_at_once(tmp_path) -> None:
         RerunFile(folder, "x", overwrite=True)
 
 
-def test_rerun_switched_off_is_said_at_once(tmp_path) -> None:
+def test_rerun_switched_off_is_said_at_once_and_takes_nothing_away(tmp_path) -> None:
+    there = tmp_path / "x.rrd"
+    there.write_bytes(b"mine")
     code = (
         "import sys; from pathlib import Path; from contourslam.view.rerun_file import RerunFile\n"
-        "RerunFile(Path(sys.argv[1]), 'x')"
+        "RerunFile(Path(sys.argv[1]), 'x', overwrite=True)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "x.rrd")], capture_output=True, text=True, env={"RERUN": "off"},
+        [sys.executable, "-c", code, str(there)], capture_output=True, text=True, env={"RERUN": "off"},
         check=False,
     )  # fmt: skip
     assert "switched off by RERUN='off'" in done.stderr
+    assert there.read_bytes() == b"mine"
 
 
 def test_maps_stay_a_small_part_of_the_file(drive, tmp_path, monkeypatch) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from contourslam.view.rerun_watch import WatchedRun
+    from contourslam.view.rerun_watch import LoggedRun
 
 _GRAPH = find_spec("gtsam") is not None
 DEFAULTS = Config(
@@ -95,26 +95,26 @@ class Run(Reading):
             continued.find_start(opening, mount)
             return continued.pose
 
-        watched = None if self.rerun is None else self._watched(self.rerun)
-        make, on_scan = (continued.make, None) if watched is None else (watched.making(continued.make), watched.on_scan)
+        logged = None if self.rerun is None else self._logged(self.rerun)
+        make, on_scan = (continued.make, None) if logged is None else (logged.making(continued.make), logged.on_scan)
         result = work.replay(make, make_mapper, begin, on_scan)
-        trouble = "" if watched is None else watched.finish(result)
         if len(result.stamps):
             metrics = work.write(result, {"back_end_reason": _reason(settings)}, command)
             continued.keep(self.output / "map.cmap", self.recording.name)
             for text in (*continued.notes, *_doubts(metrics, settings)):
                 note(text)
             _tell(self, metrics)
+        trouble = "" if logged is None else logged.finish(result)
         if trouble:
             complain(trouble)
         return work.exit_code() or int(bool(trouble))
 
-    def _watched(self, path: Path) -> "WatchedRun":
-        from contourslam.view.rerun_watch import WatchedRun, open_log
+    def _logged(self, path: Path) -> "LoggedRun":
+        from contourslam.view.rerun_watch import LoggedRun, open_log
 
         settings = self.settings
         log = open_log(path, self.recording.name, settings, [settings.detector], overwrite=self.overwrite)
-        return WatchedRun(log)
+        return LoggedRun(log)
 
 
 def _reason(settings: Config) -> str:

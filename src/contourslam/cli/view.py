@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +19,7 @@ from contourslam.errors import ConfigError, RecordingError
 if TYPE_CHECKING:
     from contourslam.recordings import Message, Recording
     from contourslam.view.player import Player
-    from contourslam.view.rerun_watch import Copied
+    from contourslam.view.rerun_watch import Logged
 
 _LOOK = 0.1  # s between two looks at Ctrl-C
 
@@ -88,10 +89,12 @@ class View:
         }
         of_recordings = {
             "--detectors": self.detectors, "--paused": self.paused, "--speed": self.speed != 1.0,
-            "--rerun": self.rerun, **topics
+            "--rerun": self.rerun, "--overwrite": self.overwrite, **topics
         }  # fmt: skip
         if self.live and (given := [name for name, value in of_recordings.items() if value]):
             raise ConfigError(f"{' and '.join(given)} are for recordings; leave them out with --live")
+        if self.overwrite and self.rerun is None:
+            raise ConfigError("--overwrite replaces the file of --rerun; leave it out without one")
         if not self.speed > 0.0:
             raise ConfigError(f"--speed must be above 0, got {self.speed}")
         self.page.check()
@@ -109,7 +112,6 @@ class View:
         )
         pace = Pace(self.speed, paused=self.paused)
         names = [name.strip() for name in self.detectors.split(",") if name.strip()]
-        copied = None if self.rerun is None else self._copied(self.rerun, path.name, names)
         replayed = Replayed(
             self._messages(recording),
             self.settings,
@@ -118,35 +120,43 @@ class View:
             duration=recording.duration,
             lidar_mount=recording.lidar_mount,
             pace=pace,
-            memory=copied,
         )
         player = replayed.player
-        if copied is not None:
-            copied.follow(player)
-        with (
-            Interrupt() as interrupt,
-            self.page.served(replayed.show, replayed.lag, print_link),
-        ):
+        if self.rerun is not None:
+            self._check_rerun(self.rerun)
+        with ExitStack() as stack:
+            interrupt = stack.enter_context(Interrupt())
+            stack.enter_context(self.page.served(replayed.show, replayed.lag, print_link))
+            logged = None
+            if self.rerun is not None:  # now that all else is known to work: it takes an earlier file away
+                logged = self._logged(self.rerun, path.name, names)
+                player.on_moment = logged.take
             player.start()
             while not interrupt.requested and player.is_alive():
                 player.join(_LOOK)
             if interrupt.requested:
                 pace.stop()
                 player.join()
-            if copied is not None and (trouble := copied.finish(recording.skipped)):
-                complain(trouble)
+            unlogged = "" if logged is None else logged.finish(recording.skipped, trouble=player.trouble)
+            if unlogged:
+                complain(unlogged)
             _tell(player)
             while not interrupt.requested:  # all that was mapped can be looked at until somebody has seen enough
                 time.sleep(_LOOK)
             pace.stop()
             player.join()
-        return 1 if player.trouble else 0
+        return 1 if player.trouble or unlogged else 0
 
-    def _copied(self, file: Path, title: str, names: list[str]) -> "Copied":
-        from contourslam.view.rerun_watch import Copied, open_log
+    def _check_rerun(self, file: Path) -> None:
+        from contourslam.view.rerun_file import check_writable
+
+        check_writable(file, overwrite=self.overwrite)
+
+    def _logged(self, file: Path, title: str, names: list[str]) -> "Logged":
+        from contourslam.view.rerun_watch import Logged, open_log
 
         lanes = names or [self.settings.detector]
-        return Copied(open_log(file, title, self.settings, lanes, overwrite=self.overwrite), len(lanes))
+        return Logged(open_log(file, title, self.settings, lanes, overwrite=self.overwrite))
 
     def _messages(self, recording: "Recording") -> "Iterator[Message]":
         from contourslam.scan import Odometry

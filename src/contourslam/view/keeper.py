@@ -41,7 +41,7 @@ class Keeper:
         self._scans = 0
         self.beams = self.returned = 0
 
-    def keep(self, scan: LaserScan, elapsed: float, done: Sequence[LaneMoment], truth: Floats | None = None) -> None:
+    def keep(self, scan: LaserScan, elapsed: float, done: Sequence[LaneMoment], truth: Floats | None = None) -> Moment:
         """Keep one scan.
 
         Parameters
@@ -53,6 +53,11 @@ class Keeper:
             What the lanes said of it.
         truth : ndarray, shape (3,), optional
             The true pose.
+
+        Returns
+        -------
+        Moment
+            What was kept.
         """
         contours = self._contours(scan)
         self.beams, self.returned = len(scan.ranges), len(contours.points)
@@ -69,6 +74,7 @@ class Keeper:
             moved = self._tell_loops(number, lane, elapsed)
             update = done[number].update
             self.draughtsman.want(number, moved, knot is not None or bool(update.born or update.dropped))
+        return moment
 
     def _contours(self, scan: LaserScan) -> Contours:
         """Those that the first lane saw; all lanes differ in nothing but the detector."""

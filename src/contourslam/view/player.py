@@ -15,6 +15,7 @@ from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.view.fed_lane import FedLane
 from contourslam.view.keeper import Keeper
 from contourslam.view.memory import Memory
+from contourslam.view.moment import Moment
 from contourslam.view.pace import Pace
 
 TRUTHS = 64  # true poses that are kept for the next scan
@@ -41,6 +42,8 @@ class Player(threading.Thread):
         Empty before the first scan.
     error : Exception or None
         What nobody foresaw; the thread has ended by it.
+    on_moment : callable
+        Called with each moment and the lanes, in this thread; set before it starts.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Player(threading.Thread):
         self.state, self.trouble = "starting", ""
         self.error: Exception | None = None
         self.lanes: Sequence[FedLane] = ()
+        self.on_moment: Callable[[Moment, Sequence[FedLane]], None] = lambda moment, lanes: None
         self._keeper: Keeper | None = None
         self._waiting: list[Odometry] = []
         self._truth: deque[TruePose] = deque(maxlen=TRUTHS)
@@ -108,7 +112,7 @@ class Player(threading.Thread):
                 lane.push_odometry(reading)
         self._waiting.clear()
         done = tuple(lane.push_scan(scan, elapsed) for lane in self.lanes)
-        self.keeper.keep(scan, elapsed, done, self._truth_at(scan.stamp))
+        self.on_moment(self.keeper.keep(scan, elapsed, done, self._truth_at(scan.stamp)), self.lanes)
         if self._pace.arrives(elapsed):  # who waits for this time wants its map, and a graph shows it now and then
             self.keeper.draughtsman.catch_up(elapsed)
         else:

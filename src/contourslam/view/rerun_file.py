@@ -1,4 +1,4 @@
-"""A file for the Rerun viewer (.rrd), written row by row while the work goes on; it never ends that work."""
+"""A file for the Rerun viewer (.rrd), written row by row while the work goes on."""
 
 import os
 from collections.abc import Callable
@@ -24,6 +24,25 @@ BATCH = 100  # scans that are written at once: each batch of each entity costs a
 A_DATE = 1e8  # s; stamps from here on count from 1970 and are shown as dates
 PATIENCE = 60.0  # s that a disk may take
 Columns = Callable[..., Any]
+_OFF = ("0", "false", "off")
+
+
+def check_writable(path: Path, *, overwrite: bool) -> None:
+    """Refuse what can be known to go wrong before anything is touched.
+
+    Raises
+    ------
+    ConfigError
+        If the suffix is another one, or the environment has switched Rerun off.
+    ResultError
+        If the file is there already, and `overwrite` is off.
+    """
+    if path.suffix != ".rrd":
+        raise ConfigError(f"{path}: a Rerun file ends in .rrd; name it {path.name}.rrd")
+    if path.exists() and not overwrite:
+        raise ResultError(f"{path} is there already; choose another name, or replace it with --overwrite")
+    if (switch := os.environ.get("RERUN", "")).lower() in _OFF:  # then the SDK writes nothing, and says nothing of it
+        raise ConfigError(f"{path}: Rerun is switched off by RERUN={switch!r} in the environment")
 
 
 class RerunFile:
@@ -57,10 +76,7 @@ class RerunFile:
     """
 
     def __init__(self, path: Path, title: str, *, overwrite: bool = False) -> None:
-        if path.suffix != ".rrd":
-            raise ConfigError(f"{path}: a Rerun file ends in .rrd; name it {path.name}.rrd")
-        if path.exists() and not overwrite:
-            raise ResultError(f"{path} is there already; choose another name, or replace it with --overwrite")
+        check_writable(path, overwrite=overwrite)
         self.path, self.trouble = path, ""
         self._tables: dict[str, tuple[Columns, list[tuple[int, float, int, dict[str, Any]]]]] = {}
         self._dates: bool | None = None
@@ -72,8 +88,6 @@ class RerunFile:
             self.stream.save(path)
         except (OSError, RuntimeError) as error:
             raise ResultError(f"{path}: cannot be written ({error}); choose another place") from error
-        if not path.exists():
-            raise ConfigError(f"{path}: Rerun is switched off by RERUN={os.environ.get('RERUN')!r} in the environment")
         self.stream.send_recording_name(title)
 
     def add(self, entity: str, columns: Columns, index: int, stamp: float, **components: Any) -> None:
