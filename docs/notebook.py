@@ -18,7 +18,8 @@
 # a map of the building and say where in it it stands. This notebook goes that way step by step: one scan, its
 # contours, the corners in them, the map, and whether the map can be believed.
 #
-# It needs `pip install "contourslam[simulation,report]"` and nothing else: the recording is made here.
+# It needs `pip install '.[simulation,report]'` in a clone of the repository, and nothing else: the recording is made
+# here.
 #
 # ## A recording
 #

@@ -55,6 +55,13 @@ def test_every_link_between_documents_leads_somewhere() -> None:
     assert [link for link in links if not (link[0].parent / link[1]).exists()] == []
 
 
+def test_the_package_is_installed_from_a_clone_for_it_is_on_no_index() -> None:
+    more = [ROOT / "docs" / "notebook.py", ROOT / "ros2" / "contourslam_ros" / "README.md"]
+    texts = {document: document.read_text() for document in [*DOCUMENTS, *more]}
+    assert any(re.search(r"pip install '?[./]", text) for text in texts.values())
+    assert [d.name for d, text in texts.items() if re.search(r"pip install (-\S+ )*['\"]?contourslam", text)] == []
+
+
 def test_every_benchmark_has_its_place_in_the_tables() -> None:
     text = (ROOT / "BENCHMARK.md").read_text()
     for script in (ROOT / "benchmarks").glob("bench_*.py"):

@@ -13,7 +13,7 @@ DOCUMENTS = sorted(
 )
 """Every document that becomes a page of the site."""
 
-ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "with the firmware", "minutes")
+ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "on your computer", "with the firmware", "minutes")
 """Titles of blocks that cannot be run here, or take too long: their commands are only held against the real parser."""
 SERVES = "until Ctrl-C"
 """Title of a block whose commands serve until Ctrl-C."""
@@ -24,7 +24,8 @@ FOLLOWED = tuple(f"docs/how_to/{name}.md" for name in ("own_detector", "nav2", "
 """Documents whose blocks a newcomer runs in a clone of his own: once is enough."""
 
 _BLOCK = re.compile(
-    r"^(?P<indent> *)```(?P<kind>bash|python)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$",
+    r"^(?P<indent> *)```(?P<kind>bash|python)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$"
+    r"(?:\s*^(?P=indent)```text\n(?P<shown>.*?)^(?P=indent)```$)?",
     re.MULTILINE | re.DOTALL,
 )
 _NEEDS = re.compile(r"<!-- needs: (.*?) -->")
@@ -32,11 +33,15 @@ _NEEDS = re.compile(r"<!-- needs: (.*?) -->")
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A block of a document: "bash" or "python", its title, its lines without what they are indented by."""
+    """A block of a document: "bash" or "python", its title, its lines without what they are indented by.
+
+    `shown` is the block of text that follows at once: what the reader is told that this one prints.
+    """
 
     kind: str
     title: str
     text: str
+    shown: str = ""
 
     @property
     def file(self) -> bool:
@@ -60,8 +65,20 @@ def blocks(document: Path) -> list[Block]:
     for block in _BLOCK.finditer(document.read_text()):
         lines = block["text"].splitlines(keepends=True)
         text = "".join(line.removeprefix(block["indent"]) for line in lines)
-        found.append(Block(block["kind"], block["title"] or "", text))
+        found.append(Block(block["kind"], block["title"] or "", text, block["shown"] or ""))
     return found
+
+
+def unsaid(shown: str, said: str) -> list[str]:
+    """Lines that are shown but were not said; figures may differ, their decimals not. One that ends in … may be cut."""
+    known = {_shape(line) for line in said.splitlines()}
+    return [line for line in shown.splitlines() if not line.endswith("…") and _shape(line) not in known]
+
+
+def _shape(line: str) -> str:
+    """A line with each digit before a point one nought, and those after it as many."""
+    figures = re.sub(r"-?\d+(\.\d+)?", lambda figure: "0" + re.sub(r"\d", "0", figure[1] or ""), line)
+    return " ".join(figures.split())
 
 
 def needs(document: Path) -> list[str]:

@@ -6,12 +6,13 @@ from urllib.parse import unquote, urldefrag
 
 
 class Page(HTMLParser):
-    """Anchors and links of one page."""
+    """Anchors and links of one page, and among these what it loads by itself."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.anchors: set[str] = set()
         self.links: list[str] = []
+        self.loaded: list[str] = []
         self.feed(path.read_text())
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -20,6 +21,8 @@ class Page(HTMLParser):
                 self.anchors.add(value)
             elif value and name in ("href", "src") and tag != "base":
                 self.links.append(value)
+                if name == "src" or tag == "link":
+                    self.loaded.append(value)
 
 
 def outside(link: str) -> bool:

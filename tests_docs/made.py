@@ -26,8 +26,8 @@ class Made:
     """Makes each thing once and copies it to where it is needed.
 
     A name says what it is: ``*.bag`` a rosbag1, ``*.mcap`` a lone MCAP file, ``*.log.xz`` a CARMEN log, ``*.tum`` true
-    poses, ``*.cmap`` a map, ``robot.yaml`` settings; ``ros2``, ``firmware`` and ``examples`` are the clone's folders,
-    and any other name is the folder of a rosbag2.
+    poses, ``*.cmap`` a map, ``robot.yaml`` settings; ``ros2``, ``firmware``, ``examples`` and ``docs`` are the clone's
+    folders, and any other name is the folder of a rosbag2.
     """
 
     def __init__(self, store: Path) -> None:
@@ -37,7 +37,7 @@ class Made:
         """Have it there under its name."""
         goal = folder / name
         goal.parent.mkdir(parents=True, exist_ok=True)
-        if name in ("ros2", "firmware", "examples"):
+        if name in ("ros2", "firmware", "examples", "docs"):
             goal.symlink_to(ROOT / name)
         elif name == "robot.yaml":
             shutil.copy(ROOT / "ros2" / "contourslam_ros" / "config" / "robot.yaml", goal)

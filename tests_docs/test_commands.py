@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from commands import DOCUMENTS, ELSEWHERE, FOLLOWED, ONCE, ROOT, SERVES, blocks, needs
+from commands import DOCUMENTS, ELSEWHERE, FOLLOWED, ONCE, ROOT, SERVES, blocks, needs, unsaid
 from made import Made
 from running import check_install, check_line, check_make, run_line, run_python, serve_line
 
@@ -13,7 +13,7 @@ RUN = [
     document
     for document in DOCUMENTS
     if any(block.run for block in blocks(document))
-    and document.parent != THEORY
+    and (document.parent != THEORY or document.stem == "index")
     and document.relative_to(ROOT).as_posix() not in FOLLOWED
 ]
 CLONE = re.compile(r"git clone |\.ci/run")
@@ -33,10 +33,11 @@ def test_the_commands_of_a_document_run_as_they_stand(document: Path, made: Made
     for name in needs(document):
         made.put(name, tmp_path)
     for block in blocks(document):
+        said = ""
         if block.file:
             (tmp_path / block.title).write_text(block.text)
         elif block.run and block.kind == "python":
-            run_python(block.text, tmp_path)
+            said = run_python(block.text, tmp_path)
         elif block.run:
             for line in block.lines():
                 if "pip install" in line:
@@ -44,9 +45,10 @@ def test_the_commands_of_a_document_run_as_they_stand(document: Path, made: Made
                 elif line.startswith("make "):  # .ci/run runs them
                     check_make(line.partition(" #")[0].split())
                 elif block.title == SERVES:
-                    serve_line(line, tmp_path)
+                    said += serve_line(line, tmp_path)
                 elif not CLONE.match(line):
-                    run_line(line, tmp_path)
+                    said += run_line(line, tmp_path)
+        assert not block.run or unsaid(block.shown, said) == [], said
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=named)
@@ -62,11 +64,18 @@ def test_what_cannot_be_run_here_is_what_the_program_understands(document: Path)
                 check_line(line)
 
 
+def test_what_a_block_shows_is_held_against_what_it_said() -> None:
+    said = "RMSE x, m     0.0014   -0.1300\nscans: 600 in 20 s\n"
+    assert unsaid("RMSE x, m   0.0021  0.2000\nscans: 5 in 7 s\nwhatever …\n", said) == []
+    for stale in ("RMSE x, m  0.002  0.2000", "RMSE of x, m  0.0021  0.2000", "scans: 5 in 7.5 s"):
+        assert unsaid(stale, said) == [stale]
+
+
 def test_no_command_stands_where_no_test_looks() -> None:
     """An indented block, or one of another kind than bash, would not be run."""
     for document in DOCUMENTS:
         text = re.sub(r"^( *)```bash.*?^\1```$", "", document.read_text(), flags=re.MULTILINE | re.DOTALL)
-        stray = re.findall(r"^ *(?:contourslam|ros2 launch|pip install) .*$", text, re.MULTILINE)
+        stray = re.findall(r"^ *(?:contourslam|ros2 launch|pip install|python|make|git) .*$", text, re.MULTILINE)
         assert stray == [], named(document)
 
 
