@@ -3,6 +3,7 @@
 import errno
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -185,6 +186,26 @@ def test_what_cannot_go_together_is_told_before_anything_moves(tmp_path: Path, f
     assert "that --view asks for" in failure("drive", "-o", out, "--view-port", "1")
     assert "--view-port must lie" in failure("drive", "-o", out, "--view", "--view-port", "70000")
     assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["drive", "robot-in-the-loop"])
+def test_an_address_that_is_taken_is_told_before_anything_is_lost(
+    command: str, tmp_path: Path, failure: Failure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from contourslam.experiments.loop_values import Firmware
+
+    monkeypatch.setattr(Firmware, "built_in", lambda folder: Firmware(folder, folder))
+    earlier = tmp_path / "out" / "recording" / "metadata.yaml"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_text("mine")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        more = ["--record"] if command == "robot-in-the-loop" else []
+        where = ("--overwrite", "--view", "--view-port", taken.getsockname()[1])
+        said = failure(command, "-o", tmp_path / "out", *where, *more)
+    assert "choose another --view-host, or another --view-port" in said
+    assert earlier.read_text() == "mine"
 
 
 def test_without_the_firmware_the_loop_says_how_to_build_it(tmp_path: Path, failure: Failure) -> None:

@@ -63,7 +63,7 @@ def test_the_robot_finds_its_way_at_real_time_through_a_fault_and_is_watched(tmp
     config = LoopConfig(seed=2, seconds=25.0, fault="unplugged", pictures=1.0, settings=DEFAULTS)
     browser = Browser()
     with ExitStack() as stack:
-        witness = Page(port=0).witness(stack, "loop", driven=True, say=browser.open)
+        witness = Page(port=0).witness(stack, DEFAULTS, "loop", driven=True, say=browser.open)
         result = robot_in_the_loop(config, Firmware.built_in(BUILD), recording=tmp_path / "recording", witness=witness)
     browser.join()
     told = [{row["name"]: row["message"] for row in status["health"]} for status in browser.of("status")]

@@ -79,12 +79,13 @@ class Drive:
         with ExitStack() as stack:
             steer, ended = self._steering(stack)
             prepare_folder(self.output, overwrite=self.overwrite)
+            make = None if page is None else page.witness(stack, settings, self.output.name, driven=True)
             make_way(self.output / "recording", overwrite=self.overwrite)
             note("making ready; the robot must stand still until it drives")
             warm_up(settings)
             interrupt = stack.enter_context(Interrupt())
             robot = Robot(openers(config, patience=self.patience, rate=self.picture_rate))
-            witness = None if page is None else page.witness(stack, self.output.name, driven=True)(robot, settings)
+            witness = None if make is None else make(robot)
             stack.enter_context(robot)
             events = robot.wait_until_ready(interrupt.or_after(None))
             live_map = LiveMap(

@@ -47,8 +47,9 @@ class RobotInTheLoop:
     def execute(self, command: str) -> int:
         """Drive, write the report and say how it went."""
         from contourslam.experiments.loop_values import Firmware, LoopConfig, fault_named
-        from contourslam.experiments.robot_in_the_loop import robot_in_the_loop
+        from contourslam.experiments.robot_in_the_loop import robot_config, robot_in_the_loop
         from contourslam.report.loop_page import TARGET, kept, loop_metrics, write_loop_report
+        from contourslam.robot.live_map import settings_of
 
         config = LoopConfig(
             self.seed, self.room, self.seconds, fault_named(self.fault), self.speed, self.pictures, self.settings
@@ -56,12 +57,17 @@ class RobotInTheLoop:
         page, built = self.watched.page, Firmware.built_in(self.firmware)
         prepare_folder(self.output, overwrite=self.overwrite)
         recording = self.output / "recording" if self.record else None
-        if recording is not None:
-            make_way(recording, overwrite=self.overwrite)
-        with Interrupt() as interrupt, ExitStack() as stack, Bar("driving") as bar:
+        with Interrupt() as interrupt, ExitStack() as stack:
+            witness = None
+            if page is not None:
+                settings = settings_of(robot_config(config, Path(), Path()), self.settings)
+                witness = page.witness(stack, settings, self.room.replace("_", " "), driven=True)
+            if recording is not None:
+                make_way(recording, overwrite=self.overwrite)
+            bar = stack.enter_context(Bar("driving"))
             result = robot_in_the_loop(
                 config, built, recording=recording, progress=bar.to, stopped=lambda: interrupt.requested,
-                witness=None if page is None else page.witness(stack, self.room.replace("_", " "), driven=True),
+                witness=witness,
             )  # fmt: skip
         written = write_loop_report(self.output, result, command=command)
         if self.json:

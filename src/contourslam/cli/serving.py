@@ -4,7 +4,7 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import tyro
 
@@ -40,7 +40,10 @@ class Page:
     browser: Flag = False
     """Open the page in this machine's browser."""
 
-    def check(self, prefix: str = "") -> None:
+    prefix: ClassVar[str] = "--"
+    """Before the names of these options."""
+
+    def check(self) -> None:
         """Refuse what cannot be served.
 
         Raises
@@ -49,7 +52,7 @@ class Page:
             If the port is none, or the library that serves the page is not installed.
         """
         if not 0 <= self.port < 65536:
-            raise ConfigError(f"--{prefix}port must lie between 0 and 65535, got {self.port}")
+            raise ConfigError(f"{self.prefix}port must lie between 0 and 65535, got {self.port}")
         from contourslam.view.serving import check_servable
 
         check_servable()
@@ -71,9 +74,16 @@ class Page:
             If it cannot be served there.
         """
         from contourslam.view.access import is_loopback
+        from contourslam.view.server import ServeError
         from contourslam.view.serving import page_server
 
-        with page_server(show, lag, host=self.host, port=self.port) as server:
+        with ExitStack() as stack:
+            try:
+                server = stack.enter_context(page_server(show, lag, host=self.host, port=self.port))
+            except ServeError as error:
+                raise ServeError(
+                    f"{error}; choose another {self.prefix}host, or another {self.prefix}port (0 for any that is free)"
+                ) from error
             say(server.url)
             others = "" if is_loopback(self.host) else ", others need the whole link"
             note(f"open this page in a browser; Ctrl-C ends it{others}")
@@ -81,32 +91,49 @@ class Page:
                 webbrowser.open(server.url)
             yield
 
-    def witness(self, stack: ExitStack, title: str, *, driven: bool, say: Say = note) -> "MakeWitness":
-        """Give what has a robot watched by the page.
+    def witness(
+        self, stack: ExitStack, settings: "Config", title: str, *, driven: bool, say: Say = note
+    ) -> "MakeWitness":
+        """Serve the page from now on, and give what has a robot watched by it.
 
         Parameters
         ----------
         stack : ExitStack
             Ends the server.
+        settings : Config
+            Those of the mapping.
         title : str
             What the page calls the robot.
         driven : bool
             Commands go to the base all the time.
         say : callable
             Called with the link.
+
+        Raises
+        ------
+        ContourslamError
+            If it cannot be served there.
         """
+        from contourslam.robot.health import RobotHealth
+        from contourslam.robot.witness import Witness
+        from contourslam.view.followed import Followed
 
-        def make(robot: "Robot", settings: "Config") -> "Witness":
-            from contourslam.robot.health import RobotHealth
-            from contourslam.robot.witness import Witness
-            from contourslam.view.followed import Followed
+        robots: list[RobotHealth] = []
+        followed = Followed(settings, title=title, health=lambda: [row for health in robots for row in health()])
+        stack.enter_context(self.served(followed.show, followed.lag, say))
 
+        def make(robot: "Robot") -> "Witness":
             health = RobotHealth(robot, driven=driven)
-            followed = Followed(settings, title=title, health=health)
-            stack.enter_context(self.served(followed.show, followed.lag, say))
+            robots.append(health)
             return Witness(health.watch, followed.follow)
 
         return make
+
+
+class _BesideOthers(Page):
+    """That of a command whose own options have these names."""
+
+    prefix = "--view-"
 
 
 @dataclass(frozen=True)
@@ -131,6 +158,6 @@ class Watched:
             if (self.view_host, self.view_port) != (HOST, PORT):
                 raise ConfigError("--view-host and --view-port say where the page is served that --view asks for")
             return None
-        page = Page(self.view_host, self.view_port)
-        page.check("view-")
+        page = _BesideOthers(self.view_host, self.view_port)
+        page.check()
         return page

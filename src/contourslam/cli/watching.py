@@ -48,19 +48,19 @@ def watch_robot(path: Path | None, settings: "Config", page: Page, *, with_base:
     with ExitStack() as stack:
         robot = Robot(parts)
         title = "robot" if path is None else path.stem
-        watched = page.witness(stack, title, driven=False, say=print_link)(robot, settings)
+        witness = page.witness(stack, settings, title, driven=False, say=print_link)(robot)
         note("making ready")
         warm_up(settings)
         interrupt = stack.enter_context(Interrupt())
         live_map = LiveMap(
-            settings, PATIENT, lidar_mount=config.lidar.mount, onlooker=watched.follow, keeps=False,
+            settings, PATIENT, lidar_mount=config.lidar.mount, onlooker=witness.follow, keeps=False,
             expects_odometry=with_base,
         )  # fmt: skip
         stack.callback(live_map.close)
         stack.enter_context(robot)
 
         def watch(event: "Event") -> None:
-            watched.watch(event)
+            witness.watch(event)
             tell_trouble(event)
 
         journey = Journey(robot, live_map, watch=watch)

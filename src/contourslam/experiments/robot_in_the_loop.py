@@ -148,7 +148,7 @@ def _drive(
 ) -> LoopResult:
     pictures: list[Picture] = []
     robot = Robot(opened)
-    watched = None if witness is None else witness(robot, settings)
+    watched = None if witness is None else witness(robot)
 
     def watch(event: Event) -> None:
         if isinstance(event, Picture):

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.live.session import Session
 from contourslam.live.worker import Onlooker
@@ -26,5 +25,5 @@ class Witness:
     follow: Callable[[Session, Floats], Onlooker]
 
 
-MakeWitness = Callable[[Robot, Config], Witness]
-"""Makes one for a robot before its parts are brought up, and the settings of its mapping."""
+MakeWitness = Callable[[Robot], Witness]
+"""Makes one for a robot before its parts are brought up."""

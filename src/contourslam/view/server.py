@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import socket
 import threading
 from http import HTTPStatus
 from typing import Self
@@ -70,10 +71,7 @@ class ViewServer:
         if self._failure is not None:
             self._thread.join()
             why = getattr(self._failure, "strerror", None) or self._failure
-            raise ServeError(
-                f"the page cannot be served at {self._host}, port {self.port} ({why}); choose another "
-                "--host, or another --port (0 for any that is free)"
-            )
+            raise ServeError(f"the page cannot be served at {self._host}, port {self.port} ({why})")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -82,8 +80,8 @@ class ViewServer:
 
     @property
     def url(self) -> str:
-        """Where the page is, seen from this machine."""
-        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self._host, self._host)
+        """Where the page is, for all who can reach it."""
+        host = _address(self._host) if self._host in _ANY else self._host
         host = f"[{host}]" if ":" in host else host
         token = self._access.token
         return f"http://{host}:{self.port}/" + (f"{token}/" if token else "")
@@ -133,6 +131,21 @@ class ViewServer:
         if found is None:
             return respond(HTTPStatus.NOT_FOUND, b"There is nothing here; is the link complete?\n")
         return respond(HTTPStatus.OK, found[1], found[0])
+
+
+_ANY = {"0.0.0.0": (socket.AF_INET, "192.0.2.1"), "::": (socket.AF_INET6, "2001:db8::1")}
+"""What stands for all addresses of a machine, and one that is nowhere (RFC 5737, RFC 3849)."""
+
+
+def _address(every: str) -> str:
+    """Give the address that this machine has on its way out; its name where there is no way."""
+    family, nowhere = _ANY[every]
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as asked:
+            asked.connect((nowhere, 9))  # chooses the way; a datagram's socket sends nothing by this
+            return str(asked.getsockname()[0])
+    except OSError:
+        return socket.gethostname()
 
 
 async def _close(server: Server) -> None:
