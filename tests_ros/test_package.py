@@ -21,8 +21,8 @@ MESSAGES = PACKAGE.with_name("contourslam_msgs")
 LAUNCHES = {"mapping": "slam", "localization": "localization", "replay": "replay"}
 PARTS = {"lidar": LidarConfig, "base": BaseNodeConfig, "camera": CameraConfig}
 NAMES = {
-    "launch": ["LaunchDescription"],
-    "launch.actions": ["DeclareLaunchArgument"],
+    "launch": ["LaunchContext", "LaunchDescription"],
+    "launch.actions": ["DeclareLaunchArgument", "OpaqueFunction"],
     "launch.conditions": ["IfCondition"],
     "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution"],
     "launch_ros": [],
@@ -34,11 +34,13 @@ NAMES = {
 
 def stand_in(name: str) -> Callable[..., Any]:
     """A class that remembers what it was made with."""
-    return lambda *values, **named: SimpleNamespace(kind=name, values=values, named=named)
+    return lambda *values, **named: SimpleNamespace(
+        kind=name, values=values, named=named, perform=lambda context: context.get(values[0], "1")
+    )
 
 
-def entities(name: str, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What a launch file starts and declares."""
+def entities(name: str, monkeypatch: pytest.MonkeyPatch, **arguments: str) -> list[Any]:
+    """What a launch file starts and declares, all arguments given unless they are named here as empty."""
     for module, names in NAMES.items():
         made: Any = ModuleType(module)
         for one in names:
@@ -50,7 +52,8 @@ def entities(name: str, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     found = module_from_spec(spec)
     spec.loader.exec_module(found)
     (listed,) = found.generate_launch_description().values
-    return list(listed)
+    known = [item.named["function"](arguments) if item.kind == "OpaqueFunction" else [item] for item in listed]
+    return [item for some in known for item in some]
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +106,16 @@ def test_a_launch_file_names_what_is_there(name: str, installed: Path, monkeypat
     if "rviz2" in nodes:
         ((share, *parts),) = nodes["rviz2"].named["arguments"][1].values
         assert installed.joinpath("share", *share.values, *parts).is_file()
+
+
+@pytest.mark.parametrize("name", ["mapping", "localization", "robot"])
+def test_what_is_not_given_is_as_the_file_of_parameters_has_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = entities(name, monkeypatch, view_port="", view_host="", frame_prefix="")
+    (_, given) = next(item.named["parameters"] for item in found if len(item.named.get("parameters", ())) == 2)
+    assert "map_file" in given and not {"view_port", "view_host", "frame_prefix"} & set(given)
+    # An argument that is left out is empty, and so not given.
+    defaults = {i.values[0]: i.named.get("default_value") for i in found if i.kind == "DeclareLaunchArgument"}
+    assert {defaults[argument] for argument in ("view_port", "view_host", "frame_prefix")} == {""}
 
 
 def test_the_whole_robot_is_started_with_parameters_that_its_nodes_have(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,6 +73,7 @@ def test_a_given_value_arrives_at_its_setting_and_whole_numbers_do_for_lengths(n
         ({"odometry": "wheels"}, "odometry must be"),
         ({"map_period": 0.0}, "map_period must be a positive number"),
         ({"view_port": 70000}, "view_port must lie between 0 and 65535"),
+        ({"view_host": "0.0.0.0"}, "view_host says where the page is served that view_port asks for"),
     ],
 )
 def test_a_wrong_value_is_refused_by_name(node: Callable[..., Node], values: dict[str, Any], named: str) -> None:

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -32,38 +32,42 @@ def node_and_rviz(
         Names of further arguments that are parameters of the node.
     """
     simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
+    kinds = dict.fromkeys(("frame_prefix", "map_file", "view_host", *texts), str) | {"view_port": int}
+
+    def node(context: LaunchContext) -> list[Node]:
+        """Start the node; what is not given here is as the file has it."""
+        given = {
+            name: ParameterValue(LaunchConfiguration(name), value_type=kind)
+            for name, kind in kinds.items()
+            if LaunchConfiguration(name).perform(context)
+        }
+        return [
+            Node(
+                package="contourslam_ros",
+                executable=executable,
+                namespace=LaunchConfiguration("namespace"),
+                output="screen",
+                parameters=[LaunchConfiguration("params_file"), given | {"use_sim_time": simulated}],
+                remappings=[("scan", LaunchConfiguration("scan")), ("odom", LaunchConfiguration("odom"))],
+            )
+        ]
+
     return LaunchDescription(
         [
             DeclareLaunchArgument("namespace", default_value="", description="Namespace of this robot."),
             DeclareLaunchArgument(
                 "frame_prefix", default_value="", description='Before its frames, such as "robot1/".'
             ),
-            DeclareLaunchArgument("params_file", default_value=PARAMETERS, description="Parameters of the node."),
+            DeclareLaunchArgument("params_file", default_value=PARAMETERS, description="Its other parameters."),
             map_file,
             DeclareLaunchArgument("scan", default_value="scan", description="Topic of the scans."),
             DeclareLaunchArgument("odom", default_value="odom", description="Topic of the wheels' odometry."),
             DeclareLaunchArgument("use_sim_time", default_value="false", description="Time comes from /clock."),
             DeclareLaunchArgument("rviz", default_value="false", description="Start RViz too."),
-            DeclareLaunchArgument("view_port", default_value="0", description="Port of the live page; 0 for none."),
-            DeclareLaunchArgument("view_host", default_value="127.0.0.1", description="Address to serve it at."),
-            Node(
-                package="contourslam_ros",
-                executable=executable,
-                namespace=LaunchConfiguration("namespace"),
-                output="screen",
-                parameters=[
-                    LaunchConfiguration("params_file"),
-                    {
-                        name: ParameterValue(LaunchConfiguration(name), value_type=str)
-                        for name in ("frame_prefix", "map_file", "view_host", *texts)
-                    }
-                    | {
-                        "use_sim_time": simulated,
-                        "view_port": ParameterValue(LaunchConfiguration("view_port"), value_type=int),
-                    },
-                ],
-                remappings=[("scan", LaunchConfiguration("scan")), ("odom", LaunchConfiguration("odom"))],
-            ),
+            DeclareLaunchArgument("view_port", default_value="", description="Port of the live page; 0 for none."),
+            DeclareLaunchArgument("view_host", default_value="", description="Address to serve it at."),
+            *more,
+            OpaqueFunction(function=node),  # after all that is declared
             Node(
                 package="rviz2",
                 executable="rviz2",
@@ -72,6 +76,5 @@ def node_and_rviz(
                 parameters=[{"use_sim_time": simulated}],
                 condition=IfCondition(LaunchConfiguration("rviz")),
             ),
-            *more,
         ]
     )

@@ -27,6 +27,7 @@ from contourslam.robot.config import load_robot
 from contourslam.robot.live_map import settings_of
 from contourslam.scan import LaserScan, Odometry
 from contourslam.view.followed import Followed
+from contourslam.view.server import ServeError
 from contourslam.view.serving import page_server
 from contourslam_ros.frames import SENT
 from contourslam_ros.grid_sender import GridSender
@@ -194,7 +195,10 @@ class LiveNode(Node):
         name = self.get_fully_qualified_name().lstrip("/")
         page = self._page = Followed(self.settings.core, title=name, back_end=self.back_end, health=self._missing)
         server = page_server(page.show, page.lag, host=self.config.view_host, port=self.config.view_port)
-        self._serving.enter_context(server)
+        try:
+            self._serving.enter_context(server)
+        except ServeError as error:
+            raise ServeError(f"{error}; choose another view_port (0 for no page) or view_host") from error
         self.get_logger().info(f"the live page is at {server.url}")
 
     def _missing(self) -> tuple[Diagnostic, ...]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from contourslam.cli.run import DEFAULTS
+from contourslam.cli.serving import HOST
 from contourslam.config import Config, LiveConfig
 from contourslam.errors import ConfigError
 
@@ -61,7 +62,7 @@ class NodeConfig:
     """The robot's file, robot.yaml: its lidar's range and its wheels' noise are then used, unless given here."""
     view_port: int = 0
     """Port at which the node serves the live page, for a browser (docs/view.md); 0 for no page."""
-    view_host: str = "127.0.0.1"
+    view_host: str = HOST
     """Address to serve it at; 0.0.0.0 for the whole network: the link, which the node logs, then has a secret in it."""
 
     def __post_init__(self) -> None:
@@ -72,6 +73,8 @@ class NodeConfig:
                 raise ConfigError(f"parameter {name} must be a positive number, got {getattr(self, name)!r}")
         if not 0 <= self.view_port < 65536:
             raise ConfigError(f"parameter view_port must lie between 0 and 65535, got {self.view_port!r}")
+        if not self.view_port and self.view_host != HOST:
+            raise ConfigError("parameter view_host says where the page is served that view_port asks for; give both")
 
     def frame(self, name: str) -> str:
         """Put the prefix before one of the frames' names."""
