@@ -1,7 +1,8 @@
-"""What the live page costs the mapping, and how far it is behind: in headless Chromium, on this machine; 8 minutes.
+"""What the live page costs the mapping, and how far it is behind: in headless Chromium, on this machine; 15 minutes.
 
 Needs Chromium and playwright. ``bench_view.py --short`` tries it all on a small part of the log, for nothing but to see
-that it runs. Mapping and browser share the machine's processors, so let nothing else run beside it.
+that it runs; ``--cost`` measures what it costs alone. Mapping and browser share the machine's processors, so let
+nothing else run beside it.
 """
 
 import json
@@ -18,10 +19,12 @@ from typing import Any, Self
 import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from listeners import Listeners
 from logs import find_logs
 from table import Table, publish
 
 SHORT = "--short" in sys.argv[1:]
+COST = "--cost" in sys.argv[1:]
 WHOLE = 1000 if SHORT else 10**9  # scans that are shown at ten times real time
 PART = 1500 if SHORT else 9000  # scans that are mapped as fast as possible
 REPEATS = 1 if SHORT else 5
@@ -171,32 +174,40 @@ def slope_of(at: "np.ndarray[Any, Any]", lag: "np.ndarray[Any, Any]") -> tuple[f
 
 
 WAYS = {
-    "the loop of `contourslam run`": ("run", 0),
-    "the page's player, without a server": ("alone", 0),
-    "server, no page": ("served", 0),
-    "one page": ("served", 1),
-    "four pages, one of which stops reading": ("served", 4),
-    f"one page, {RECONNECTS} reconnects": ("served", 1),
+    "the loop of `contourslam run`": ("run", 0, 0),
+    "the page's player, without a server": ("alone", 0, 0),
+    "server, no page": ("served", 0, 0),
+    "one page read elsewhere": ("served", 0, 1),
+    "four read elsewhere, one of which stops reading": ("served", 0, 4),
+    f"one read elsewhere, {RECONNECTS} reconnects": ("served", 0, 1),
+    "one page drawn here": ("served", 1, 0),
+    "four drawn here, one of which stops reading": ("served", 4, 0),
+    f"one drawn here, {RECONNECTS} reconnects": ("served", 1, 0),
 }
+"""How it is mapped, how many browser's pages are open, and how many links that are read and not drawn."""
 BASE = "the page's player, without a server"
 
 
 def watched(log: Path, pages: Pages, way: str, cost: Cost) -> None:
     """Map once as fast as possible, watched in one way."""
-    how, count = WAYS[way]
-    with Drive(log, PART, float("inf"), how) as drive:
+    how, count, links = WAYS[way]
+    with Drive(log, PART, float("inf"), how) as drive, ExitStack() as stack:
         opened = [pages.open(drive.url) for _ in range(count)]
         if count == 4:
             stop_reading(opened[0])
+        halted = int(links == 4)
+        listeners = stack.enter_context(Listeners(drive.url, links - halted, halted)) if links else None
         before = pages.cpu()
         drive.say("go")
         done = 0
         while not drive.ask("memory")["mapped"]:
+            time.sleep(0.05)
             if "reconnects" in way and done < RECONNECTS:
-                opened[0].evaluate(RECONNECT)
+                if listeners is None:
+                    opened[0].evaluate(RECONNECT)
+                else:
+                    listeners.reconnect()
                 done += 1
-            else:
-                time.sleep(0.05)
         browser = pages.cpu() - before
         told = drive.ask("end")
         pages.close()
@@ -207,7 +218,7 @@ def watched(log: Path, pages: Pages, way: str, cost: Cost) -> None:
     cost.wall.append(told["wall"])
     cost.process.append(told["process"] - told["cpu"])
     cost.browser.append(browser)
-    cost.frames.append(len(told["rows"]))
+    cost.frames.append(len(told["rows"]) if listeners is None else listeners.frames)
     cost.memory.append(told["memory"])
 
 
@@ -273,7 +284,8 @@ def main() -> None:
     log = logs["intel"].path
     with sync_playwright() as playwright, playwright.chromium.launch(executable_path=chromium, args=OPTIONS) as browser:
         pages = Pages(browser)
-        tables = [side_by_side(log, pages), reconnects(log, pages), live(log, pages)]
+        parts = [side_by_side] if COST else [side_by_side, reconnects, live]
+        tables = [part(log, pages) for part in parts]
     for table in tables:
         publish(table)
 
