@@ -47,10 +47,18 @@ def test_a_run_does_not_differ_from_itself() -> None:
     assert (same.mean, same.low, same.high, same.share) == (0.0, 0.0, 0.0, 0.5)
 
 
+@pytest.mark.parametrize("pairs", [1, 4, 99])
+def test_too_few_pairs_give_no_interval(pairs: int) -> None:
+    found = paired_difference(np.zeros(pairs), np.ones(pairs))
+    assert (found.count, found.mean, found.share) == (pairs, -1.0, 1.0)
+    assert np.isnan([found.low, found.high]).all()
+    assert np.isfinite(paired_difference(np.zeros(100), np.ones(100)).low)
+
+
 def test_what_is_not_known_is_left_out_and_nothing_gives_nothing() -> None:
     errors = np.array([np.nan, 1.0, 2.0])
     found = paired_difference(errors, np.array([1.0, np.nan, 1.0]))
-    assert (found.count, found.mean, found.low, found.high) == (1, 1.0, 1.0, 1.0)
+    assert (found.count, found.mean, found.share) == (1, 1.0, 0.0)
     assert np.isnan(paired_difference(np.zeros(0), np.zeros(0)).mean)
     with pytest.raises(ValueError, match="pairs"):
         paired_difference(np.zeros(2), np.zeros(3))

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+_FEWEST = 100  # pairs: ten blocks of ten
+
 
 @dataclass(frozen=True, slots=True)
 class PairedDifference:
@@ -23,7 +25,8 @@ class PairedDifference:
     mean : float
         NaN without a pair.
     low, high : float
-        The mean lies between them with the asked probability, as far as the drive stands for others like it.
+        The mean lies between them with the asked probability, as far as the drive stands for others like it; NaN for
+        fewer than 100 pairs, whose blocks are too few to tell.
     share : float
         Part of the pairs in which the first is the smaller one; equal ones count half.
     count, block : int
@@ -70,11 +73,14 @@ def paired_difference(
     n = len(differences)
     if n == 0:
         return PairedDifference(math.nan, math.nan, math.nan, math.nan, 0, 0)
+    mean = float(differences.mean())
+    smaller = float(np.mean(differences < 0.0) + 0.5 * np.mean(differences == 0.0))
     block = math.ceil(math.sqrt(n))
+    if n < _FEWEST:
+        return PairedDifference(mean, math.nan, math.nan, smaller, n, block)
     ring = np.concatenate([[0.0], np.cumsum(np.concatenate([differences, differences[:block]]))])
     begins = np.random.default_rng(seed).integers(0, n, (draws, math.ceil(n / block)))
     means = (ring[begins + block] - ring[begins]).mean(axis=1) / block
     tail = 0.5 * (1.0 - probability)
     low, high = np.quantile(means, (tail, 1.0 - tail)).tolist()
-    smaller = np.mean(differences < 0.0) + 0.5 * np.mean(differences == 0.0)
-    return PairedDifference(float(differences.mean()), low, high, float(smaller), n, block)
+    return PairedDifference(mean, low, high, smaller, n, block)
