@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contourslam.contour.contours import Contours, Floats
 from contourslam.landmarks import trace
 from contourslam.scan import LaserScan
+from contourslam.slam.result import Loop
 from contourslam.view.draughtsman import Draughtsman
 from contourslam.view.knots import Knotter
 from contourslam.view.lane import Lane
@@ -14,6 +15,16 @@ from contourslam.view.memory import Memory
 from contourslam.view.moment import LaneMoment, Moment, trace_of
 
 LARGE = 0.05  # m by which a loop must move the robot to be told of
+
+
+def shift_of(loop: Loop) -> float:
+    """Give how far off the robot was, m."""
+    return math.hypot(loop.shift[0], loop.shift[1])
+
+
+def is_told(loop: Loop) -> bool:
+    """Whether whoever watches wants to know of it; ties to places just left come all the time."""
+    return shift_of(loop) > LARGE or loop.method != "nearby"
 
 
 class Keeper:
@@ -86,9 +97,9 @@ class Keeper:
         """Note new loops among the events; True where one has moved the robot."""
         moved = False
         for loop in lane.loops[self._told[number] :]:
-            shift = math.hypot(loop.shift[0], loop.shift[1])
+            shift = shift_of(loop)
             moved |= shift > LARGE
-            if shift > LARGE or loop.method != "nearby":
+            if is_told(loop):
                 self._memory.add_event(
                     elapsed, "loop", f"loop by {loop.method}, {shift:.2f} m off", lane=number,
                     x=float(lane.last_pose[0]), y=float(lane.last_pose[1]), shift=shift,

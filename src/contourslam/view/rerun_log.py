@@ -13,7 +13,7 @@ from contourslam.detectors import Detector
 from contourslam.geometry.poses import compose_one, transform
 from contourslam.slam.look import Look
 from contourslam.slam.result import Loop
-from contourslam.view.keeper import LARGE
+from contourslam.view.keeper import LARGE, is_told, shift_of
 from contourslam.view.lane import Lane
 from contourslam.view.moment import LaneMoment, Moment
 from contourslam.view.rerun_file import RerunFile
@@ -190,10 +190,8 @@ class RerunLog:
 
     def _loops(self, name: str, lane: Lane) -> None:
         for loop in lane.loops[self._told[name] :]:
-            moved = math.hypot(loop.shift[0], loop.shift[1])
-            level = INFO if moved > LARGE or loop.method != "nearby" else DEBUG
-            self.tell(_loop_text(loop, moved), level, entity=f"log/{name}")
-            if moved > LARGE:
+            self.tell(_loop_text(loop), INFO if is_told(loop) else DEBUG, entity=f"log/{name}")
+            if shift_of(loop) > LARGE:
                 self._weights[name] = 0.0
         self._told[name] = len(lane.loops)
 
@@ -230,9 +228,9 @@ class RerunLog:
         self.file.fix(f"world/{name}/robot/lidar", rr.Transform3D(translation=[x, y, 0.0], quaternion=turn))
 
 
-def _loop_text(loop: Loop, moved: float) -> str:
+def _loop_text(loop: Loop) -> str:
     angle = math.degrees(abs(float(loop.shift[2])))
     return (
-        f"{moved:.2f} m and {angle:.1f}° off, by {loop.method}, {loop.pairs} pairs, "
+        f"{shift_of(loop):.2f} m and {angle:.1f}° off, by {loop.method}, {loop.pairs} pairs, "
         f"residual {100.0 * loop.residual:.1f} cm, to {loop.earlier_stamp:.3f} s"
     )
