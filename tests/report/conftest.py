@@ -1,9 +1,9 @@
 import shutil
-import subprocess
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,17 +28,6 @@ from contourslam.slam.result import Loop, RunResult
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 VOID = {"meta", "link", "img", "br", "hr"}
-
-# A page has no script, so a copy gets one that tells what the browser made of it.
-PROBE = """<script>
-addEventListener("error", e => document.documentElement.dataset.errors = e.message || e.target.src, true);
-addEventListener("load", () => {
-  const root = document.documentElement, images = [...document.images];
-  root.dataset.broken = images.filter(i => !i.complete || !i.naturalWidth).map(i => i.src.slice(0, 200)).join(" ");
-  root.dataset.images = images.length;
-  root.dataset.requests = performance.getEntriesByType("resource").map(r => r.name.slice(0, 200)).join(" ");
-  root.dataset.overflow = document.body.scrollWidth - document.body.clientWidth;
-});</script>"""
 
 ROOM = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
 
@@ -70,21 +59,47 @@ def parsed() -> type[Page]:
     return Page
 
 
-@pytest.fixture
-def browse(tmp_path: Path) -> Callable[..., dict[str, str]]:
-    """Open a page as a file in a real browser; tell what it made of it. Without a browser the test is skipped."""
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A real browser, one for all tests of a file: to start it takes longer than most of them. Skipped without one."""
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
+    with api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield found
+        found.close()
 
-    def opened(page: Path, *, width: int) -> dict[str, str]:
-        copy = page.with_name("probe.html")
-        narrow = f"{PROBE}<style>html {{ width: {width}px }}</style>"
-        copy.write_text(page.read_text().replace("<head>", "<head>" + narrow, 1))
-        options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-        command = [CHROMIUM, *options, f"--user-data-dir={tmp_path}", "--virtual-time-budget=5000", "--dump-dom"]
-        done = subprocess.run([*command, copy.as_uri()], capture_output=True, text=True, timeout=60, check=True)
-        copy.unlink()
-        return dict(Page(done.stdout).all("html")[0])
+
+@dataclass(frozen=True)
+class Seen:
+    """What a browser made of a page: its pictures and those that failed, what it asked for, complaints, px too wide."""
+
+    images: int
+    broken: list[str]
+    requests: list[str]
+    errors: list[str]
+    overflow: int
+
+
+@pytest.fixture
+def browse(browser: Any) -> Callable[..., Seen]:
+    """Open a page as a file in a real browser, and tell what it made of it."""
+
+    def opened(file: Path, *, width: int) -> Seen:
+        requests: list[str] = []
+        errors: list[str] = []
+        with browser.new_context(viewport={"width": width, "height": 900}) as context:
+            page = context.new_page()
+            page.on("request", lambda request: requests.append(request.url))
+            page.on("console", lambda message: errors.append(message.text))
+            page.on("pageerror", lambda error: errors.append(str(error)))
+            page.goto(file.as_uri())
+            images = page.evaluate("[...document.images].map((i) => [i.src, i.complete && i.naturalWidth > 0])")
+            overflow = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        broken = [source for source, shown in images if not shown]
+        return Seen(len(images), broken, [url for url in requests if url != file.as_uri()], errors, overflow)
 
     return opened
 

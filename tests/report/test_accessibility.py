@@ -1,6 +1,6 @@
 """Every page of the report for those who do not see it, or not well: checked by axe in a real browser."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,6 @@ from contourslam.robot.bring_up import Trouble
 from contourslam.simulation.hardware.live_world import Record
 from contourslam.slam.result import RunResult
 
-from .conftest import CHROMIUM
-
 Faults = Callable[[Path], list[str]]
 PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
@@ -38,30 +36,24 @@ SCENE = '{"seen": {"wall": 0.9, "floor": null}, "bytes": 1000, "pictures": {"use
 
 
 @pytest.fixture(scope="module")
-def faults() -> Iterator[Faults]:
+def faults(browser: Any) -> Faults:
     """Ask axe what is wrong with a page, light and dark, wide and narrow, with all its folds open."""
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
     checker = axe.Axe()
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
 
-        def ask(file: Path) -> list[str]:
-            return [fault for scheme, width in (("light", 1280), ("dark", 390)) for fault in look(file, scheme, width)]
+    def ask(file: Path) -> list[str]:
+        return [fault for scheme, width in (("light", 1280), ("dark", 390)) for fault in look(file, scheme, width)]
 
-        def look(file: Path, scheme: str, width: int) -> list[str]:
-            with browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}) as context:
-                page = context.new_page()
-                page.goto(file.as_uri())
-                page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
-                page.wait_for_timeout(100)  # what opens is drawn
-                found = checker.run(page).response["violations"]
-            return [f"{scheme}, {width}: {fault['id']}: {node['html']}" for fault in found for node in fault["nodes"]]
+    def look(file: Path, scheme: str, width: int) -> list[str]:
+        with browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}) as context:
+            page = context.new_page()
+            page.goto(file.as_uri())
+            page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+            page.wait_for_timeout(100)  # what opens is drawn
+            found = checker.run(page).response["violations"]
+        return [f"{scheme}, {width}: {fault['id']}: {node['html']}" for fault in found for node in fault["nodes"]]
 
-        yield ask
-        browser.close()
+    return ask
 
 
 def test_the_page_of_a_run_and_its_scene(make_graph_run: Callable[..., RunResult], tmp_path: Path, faults: Faults):

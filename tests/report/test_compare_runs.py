@@ -5,23 +5,36 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import get_type_hints
+from xml.etree import ElementTree
 
+import matplotlib
 import numpy as np
 import pytest
+import tyro
 
 from contourslam.cli import main
+from contourslam.cli.drive import Drive
+from contourslam.cli.run import Run
 from contourslam.config import Config, SlamConfig
 from contourslam.errors import ConfigError, ContourslamError, ResultError
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.evaluation.relations import judge
 from contourslam.geometry.poses import between, compose
 from contourslam.report.figures.of_runs import figures_of
+from contourslam.report.figures.paper_errors import (
+    differences_figure,
+    distribution_figure,
+    nis_figure,
+    truth_figure,
+)
+from contourslam.report.figures.paper_maps import maps_figure, ways_figure
 from contourslam.report.figures.save import save_figure
 from contourslam.report.page.runs.differs import other_options
-from contourslam.report.page.runs.values import differing
+from contourslam.report.page.runs.values import RunsReport, differing
 from contourslam.report.relation_table import RELATIONS, read_relation_table, write_relation_table
 from contourslam.report.result_folder import write_result_folder
-from contourslam.report.runs_groups import fit, grouped
+from contourslam.report.runs_groups import Errors, fit, grouped
 from contourslam.report.runs_page import write_runs_report
 from contourslam.report.runs_reading import distinct_names, read_runs
 
@@ -202,10 +215,23 @@ def test_what_differs_and_nothing_else_is_told_of_the_settings(report) -> None:
 def test_a_setting_over_two_recordings_has_mean_and_spread(report) -> None:
     table = rows(report / "tables" / "spread.csv")
     assert table["runs"][0] == "2"
+    assert table["recordings"][0] == "2"
     mean, spread = map(float, table["relation error, mean, m"][:2])
     both = [float(rows(report / "tables" / f"measures_{i}.csv")["relation error, mean, m"][0]) for i in (1, 2)]
     assert mean == pytest.approx(np.mean(both), abs=1e-4)
     assert spread == pytest.approx(np.std(both, ddof=1), abs=1e-4)
+
+
+def test_a_recording_that_was_mapped_more_often_counts_no_more(folders, tmp_path, make_run) -> None:
+    again = written(tmp_path / "again", noisier(make_run(), 2.0), truth=False)
+    runs = read_runs([folders[0], again, folders[3]])
+    write_runs_report(tmp_path / "out", runs)
+    table = rows(tmp_path / "out" / "tables" / "spread.csv")
+    assert (table["recordings"][0], table["runs"][0]) == ("2", "3")
+    one, two, other = (run.metrics["relations"]["translation"]["mean"] for run in runs)
+    mean, spread = map(float, table["relation error, mean, m"][:2])
+    assert mean == pytest.approx(np.mean([(one + two) / 2, other]), abs=1e-4)
+    assert spread == pytest.approx(np.std([(one + two) / 2, other], ddof=1), abs=1e-4)
 
 
 def test_a_difference_that_is_sure_is_told_from_one_that_is_not(report) -> None:
@@ -227,21 +253,117 @@ def test_the_numbers_hold_all_that_the_page_shows(report) -> None:
 
 
 def test_an_earlier_comparisons_figures_do_not_stay(report, folders, tmp_path) -> None:
-    for name in ("figures/maps_9.pdf", "tables/measures_9.tex"):
+    own = ("figures/robot.pdf", "figures/maps_of_mine.svg", "tables/results.csv", "tables/settings.txt")
+    for name in ("figures/maps_9.pdf", "tables/measures_9.tex", *own):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text("an earlier one's")
+        (tmp_path / name).write_text("not this one's")
     write_runs_report(tmp_path, read_runs(folders[3:]))
-    assert list((tmp_path / "figures").iterdir()) == []
-    assert {path.stem for path in (tmp_path / "tables").iterdir()} == {"measures", "settings"}
+    written = {"tables/measures.csv", "tables/measures.tex", "tables/settings.csv", "tables/settings.tex"}
+    assert {str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*")} == {*own, *written}
+
+
+def test_all_that_a_comparison_writes_is_known_as_its_own(report, folders, tmp_path, make_run) -> None:
+    truth = [written(tmp_path / "a", make_run()), written(tmp_path / "b", noisier(make_run(), 2.0))]
+    write_runs_report(tmp_path / "out", read_runs(truth))
+    for folder in (report, tmp_path / "out"):
+        known = RunsReport(folder, tuple(grouped(read_runs(folders))), "")
+        for part in ("figures", "tables"):
+            assert sorted(known.own_files(part)) == sorted((folder / part).iterdir()) != []
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_the_opening_words_quote_what_the_page_tables(tmp_path, make_run, truth) -> None:
+    runs = [
+        written(tmp_path / name, one, truth=truth) for name, one in (("a", make_run()), ("b", noisier(make_run(), 2.0)))
+    ]
+    metrics = write_runs_report(tmp_path / "out", read_runs(runs))
+    lead = re.search(r'<p class="lead">(.*?)</p>', (tmp_path / "out" / "index.html").read_text())[1]
+    what, pair = ("Absolute trajectory error, RMS", "position error") if truth else ("Relation error, mean",) * 2
+    assert f"{what}: from 0.0" in lead
+    assert lead.endswith("(b); how sure that is, stands below.")
+    pairs = metrics["recordings"]["hall.bag"]["pairs"]
+    assert pair.split(",")[0].lower() in [one["measure"] for one in pairs]
+
+
+def test_too_few_pairs_are_said_to_be(tmp_path, make_run) -> None:
+    run = make_run(scans=24)
+    runs = [written(tmp_path / name, noisier(run, by), truth=False) for name, by in (("a", 1.0), ("b", 5.0))]
+    write_runs_report(tmp_path / "out", read_runs(runs))
+    table = rows(tmp_path / "out" / "tables" / "difference_of_relation_error.csv")
+    mean, low, high, _, pairs, verdict = table["a − b"]
+    assert float(mean) < 0.0
+    assert (low, high, pairs, verdict) == ("", "", "4", "too few pairs")
+    assert (
+        json.loads((tmp_path / "out" / "metrics.json").read_text())["recordings"]["hall.bag"]["pairs"][0]["difference"][
+            "low"
+        ]
+        is None
+    )
+
+
+def test_page_and_figures_show_the_same_errors(folders) -> None:
+    group = grouped(read_runs(folders))[0]
+    assert {errors.name: list(errors.of) for errors in group.errors()} == {
+        "relation_errors": ["a/out", "b/out"],  # the incomplete run has errors of another drive
+        "relation_turns": ["a/out", "b/out"],
+    }
+    figures = dict(figures_of([group], 3.5))
+    for errors in group.errors():
+        assert [line.get_label() for line in figures[errors.name].axes[0].lines] == list(errors.of)
+
+
+def test_figures_of_runs_whose_names_look_alike_do_not_replace_each_other(tmp_path, make_run) -> None:
+    names = ("a b", "a_b", "A_B", "relation", "b")
+    folders = [written(tmp_path / name, replace(make_run(), odometry=make_run(seed=3).odometry)) for name in names]
+    made = [name.lower() for name, _ in figures_of(grouped(read_runs(folders)), 3.5)]
+    assert len(made) == len(set(made))
+    assert {"a_b_map", "a_b_2_map", "a_b_3_map", "relation_2_map", "b_map"} < set(made)
+
+
+HOSTILE = ("_ekf", "__", r"$\frac$", "$a$", "a$b", r"\$", "100 %", "{x}^2_3", "<b>&")
+
+
+def test_a_runs_name_stands_in_figures_as_it_is(make_run, tmp_path) -> None:
+    run = make_run(scans=50)
+    walls, ways = run.wall_map.end_points, dict.fromkeys(HOSTILE, run.poses)
+    apart = dict.fromkeys(HOSTILE, (run.stamps, run.nis, run.nis))
+    drawn = {
+        "ways": ways_figure(ways, walls),
+        "maps": maps_figure(dict.fromkeys(HOSTILE, (run.wall_map, run.corner_map, run.poses))),
+        "differences": differences_figure(apart),
+        "errors": distribution_figure(Errors("", "error", "m", dict.fromkeys(HOSTILE, run.nis))),
+        "nis": nis_figure(dict.fromkeys(HOSTILE, run)),
+    }
+    for name, figure in drawn.items():
+        path = tmp_path / f"{name}.svg"
+        with matplotlib.rc_context({"svg.fonttype": "none"}):  # letters stay text
+            figure.savefig(path)
+        texts = [
+            "".join(element.itertext()).strip() for element in ElementTree.parse(path).iter() if "}text" in element.tag
+        ]
+        assert set(HOSTILE) <= set(texts), name
+
+
+def test_the_band_of_a_consistent_filter_is_the_filters(make_run, make_graph_run) -> None:
+    ekf, graph = make_run(), make_graph_run()
+    assert len(nis_figure({"ekf": ekf}).axes[0].collections) == 1
+    axes = nis_figure({"graph": graph}).axes[0]
+    assert (len(axes.collections), len(axes.lines)) == (0, 1)
+    assert axes.lines[0].get_label() == "graph: contours against wheels"
+    assert len(nis_figure({"graph": graph, "ekf": ekf}).axes[0].collections) == 1
+
+
+def test_the_errors_of_a_long_run_stay_a_small_figure(make_run) -> None:
+    figure = truth_figure(make_run(scans=20_000))
+    assert all(len(axes.lines[0].get_xdata()) <= 2000 for axes in figure.axes)
 
 
 def test_the_page_fits_a_phone_in_a_real_browser(report, browse) -> None:
     captions = re.findall(r'role="region" aria-label="([^"]+)"', (report / "index.html").read_text())
     assert len(captions) == len(set(captions))
     seen = browse(report / "index.html", width=360)
-    assert seen["data-broken"] == ""
-    assert "data-errors" not in seen
-    assert int(seen["data-overflow"]) <= 0
+    assert seen.broken == seen.errors == []
+    assert seen.overflow <= 0
 
 
 def test_figures_for_a_paper_embed_their_fonts_and_are_as_wide_as_asked(folders, tmp_path) -> None:
@@ -282,6 +404,21 @@ def test_settings_of_the_walls_are_settings_too(tmp_path, make_run) -> None:
     assert differing(runs) == {"slam.walls": ["False", "True"]}
 
 
+def test_every_flag_of_a_run_is_known_to_take_no_value(tmp_path, make_run) -> None:
+    folders = [written(tmp_path / name, make_run()) for name in ("a", "b")]
+    one, two = read_runs(folders)
+    flags = [
+        name
+        for command in (Run, Drive)
+        for name, hint in get_type_hints(command, include_extras=True).items()
+        if tyro.conf.FlagCreatePairsOff in getattr(hint, "__metadata__", ())
+    ]
+    assert {"ignore_odometry", "keys", "json"} <= set(flags)
+    for option in ("--" + name.replace("_", "-") for name in flags):
+        command = {"command": f"contourslam run {option} x.bag"}
+        assert other_options([replace(one, about=command), replace(two, about={})])[0] in ([option], []), option
+
+
 def test_options_that_are_no_settings_are_told_apart_too(tmp_path, make_run) -> None:
     folders = [written(tmp_path / name, make_run()) for name in ("a", "b")]
     commands = ("run x.bag --wheel-noise 1 --every 2 --max-scans=9 -o a", "run x.bag --every 2 --detector wu -o b")
@@ -290,5 +427,10 @@ def test_options_that_are_no_settings_are_told_apart_too(tmp_path, make_run) -> 
         for run, command in zip(read_runs(folders), commands, strict=True)
     ]
     assert other_options(runs) == [["--wheel-noise 1", "--max-scans 9"], []]
+    commands = ("run --ignore-odometry x.bag --view -o a", "run --every 2 x.bag -o b")
+    runs = [
+        replace(run, about={"command": f"contourslam {command}"}) for run, command in zip(runs, commands, strict=True)
+    ]
+    assert other_options(runs) == [["--ignore-odometry"], ["--every 2"]]
     broken = [replace(run, about={"command": "contourslam run 'x"}) for run in runs]
     assert other_options(broken) == [[], []]

@@ -16,10 +16,11 @@ from contourslam.config import Config
 from contourslam.evaluation.metrics import run_metrics
 from contourslam.evaluation.relations import JudgedRelations, judge
 from contourslam.geometry.poses import between
+from contourslam.report.page.run.values import degrees
 from contourslam.report.run_page import write_run_page
 from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
 from contourslam.report.svg.axes import Axes
-from contourslam.report.svg.colours import SHADES
+from contourslam.report.svg.colours import GREY, SHADES
 from contourslam.report.svg.series import matching_drawing, relation_drawing
 from contourslam.report.svg.ticks import ticks
 from contourslam.report.svg.way import error_map_drawing, map_drawing, poses_at
@@ -121,6 +122,16 @@ def test_the_largest_loops_come_first_and_the_table_ends_at_thirty(full: Path, m
     assert shifts[0] == pytest.approx(np.hypot(*first.shift[:2]), abs=1e-4)
     assert float(rows[0][3]) == pytest.approx(np.degrees(first.shift[2]), abs=0.01)
     assert "The 30 of 40 closed loops" in part
+
+
+def test_an_angle_near_zero_has_no_sign() -> None:
+    assert [degrees(value) for value in (-1e-6, 1e-6, -0.01, None)] == ["0.00°", "0.00°", "-0.57°", "–"]
+
+
+def test_the_filters_nis_is_held_against_one_and_the_graphs_is_not(make_run: Make, make_graph_run: Make) -> None:
+    rule = f'stroke="{GREY}" stroke-width="0.8" stroke-linejoin'
+    assert rule in matching_drawing(make_run()).text
+    assert rule not in matching_drawing(make_graph_run()).text
 
 
 def test_a_single_scan_has_its_page(tmp_path: Path, make_graph_run: Make) -> None:
@@ -264,8 +275,7 @@ def test_a_real_browser_shows_the_page_and_asks_for_nothing(full: Path, browse, 
     images = len(parsed((full / "index.html").read_text()).all("img"))
     for width in (360, 1280):
         seen = browse(full / "index.html", width=width)
-        assert seen["data-broken"] == ""
-        assert "data-errors" not in seen
-        assert int(seen["data-images"]) == images
-        assert int(seen["data-overflow"]) <= 0
-        assert all(request.startswith("data:") for request in seen["data-requests"].split())
+        assert seen.broken == seen.errors == []
+        assert seen.images == images
+        assert seen.overflow <= 0
+        assert all(request.startswith("data:") for request in seen.requests)

@@ -13,14 +13,12 @@ import pytest
 
 from contourslam.config import Config
 from contourslam.evaluation.metrics import run_metrics
-from contourslam.evaluation.relations import JudgedRelations, judge
+from contourslam.evaluation.relations import JudgedRelations, RelationErrors, judge
 from contourslam.geometry.poses import between
 from contourslam.report.run_page import write_run_page
 from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
 from contourslam.report.svg.series import pieces
 from contourslam.slam.result import RunResult
-
-from .conftest import CHROMIUM
 
 NASTY = '</script><img src=x onerror="document.title=1"><b>&'
 MAP, CHART = 'figure[data-name="map"]', 'figure[data-name="matching"]'
@@ -44,19 +42,6 @@ def page_file(run: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     metrics = run_metrics(run, relations=relations)
     write_run_page(folder, run, Config(), metrics, relations, command=NASTY, name=f"drive {NASTY}")
     return folder / "index.html"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """One for all tests of this file: to start it takes longer than any of them."""
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
-    with api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
-        yield found
-        found.close()
 
 
 @pytest.fixture
@@ -179,9 +164,8 @@ def test_the_wheel_zooms_about_the_mouse_only_where_it_is_meant_to(opened: Calla
     wait(page, f"figures[0].closeness() > {0.99 * np.exp(500 / 300)}")
     assert metres_across(page) < wide / 4
     assert page.evaluate("scrollY") == begin
-    np.testing.assert_allclose(
-        on_screen(page, *place), at, atol=3.0
-    )  # a mouse knows whole px, here five times as large
+    grown = wide / metres_across(page)
+    np.testing.assert_allclose(on_screen(page, *place), at, atol=grown)  # a mouse's px are whole: the rest is cut off
 
 
 def test_buttons_keys_drag_and_double_click_move_the_map_and_fit_brings_it_back(opened: Callable[..., Any]) -> None:
@@ -412,6 +396,34 @@ def test_a_run_in_which_nothing_happened_has_a_page_that_answers(
     page.locator(f"{MAP} .stage").focus()
     for key in ("c", "w", "l", "+", "0", "Escape"):
         page.keyboard.press(key)
+
+
+def test_errors_of_two_shades_on_one_path_tell_each_its_own(
+    opened: Callable[..., Any], make_run: Callable[..., RunResult], tmp_path: Path
+) -> None:
+    run = make_run()
+    stamps = np.column_stack([run.stamps[[0, 1, 2]], run.stamps[[90, 90, 200]]])  # two end at one pose
+    errors = np.array([0.001, 0.1, 0.5])
+    one = RelationErrors(errors, errors, 0)
+    relations = JudgedRelations(stamps, one, None, one)
+    write_run_page(tmp_path, run, Config(), run_metrics(run, relations=relations), relations)
+    page = opened(tmp_path / "index.html")
+    page.evaluate("globalThis.dots = figures.find((one) => one.figure.dataset.name === 'relation-map')")
+    paths = page.evaluate("[...dots.svg.querySelectorAll('[data-layer=errors] path')].map((p) => p.getAttribute('d'))")
+    assert len(paths) == 3
+    assert paths[0] == paths[1]
+    assert page.evaluate("dots.members.errors.length") == len(errors)
+    expected = page.evaluate("dots.facts.errors.error")
+    np.testing.assert_allclose(expected, 1000.0 * errors)
+
+
+def test_every_axis_has_three_numbers_or_more_and_room_for_them(opened: Callable[..., Any]) -> None:
+    page = opened()
+    for many in (1.0, 2.6, 3.3, 10.0):
+        for span in np.geomspace(0.01, 500.0, 60):
+            found = page.evaluate("([low, high, many]) => roundNumbers(low, high, many)", [-0.37, -0.37 + span, many])
+            assert 3 <= len(found) <= max(6, many + 1), (span, many)
+            assert all(-0.37 - 1e-6 <= value <= -0.37 + span * (1 + 1e-6) for value in found)
 
 
 def test_every_figure_and_control_can_be_reached_by_keys_and_has_a_name(opened: Callable[..., Any]) -> None:

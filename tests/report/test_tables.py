@@ -1,7 +1,6 @@
 import csv
 import io
 import re
-import shutil
 from html.parser import HTMLParser
 
 import pytest
@@ -108,23 +107,10 @@ def test_the_page_holds_both_forms_behind_buttons_that_no_script_would_leave_hid
     assert '<p class="copy" hidden>' in text
 
 
-@pytest.fixture(scope="module")
-def chromium():
-    from playwright.sync_api import sync_playwright
-
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if path is None:
-        pytest.skip("no Chromium on this machine")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
 @pytest.mark.parametrize("clipboard", ["granted", "refused"])
-def test_a_table_is_copied_from_a_file_with_mouse_or_keyboard(chromium, tmp_path, clipboard) -> None:
+def test_a_table_is_copied_from_a_file_with_mouse_or_keyboard(browser, tmp_path, clipboard) -> None:
     (tmp_path / "index.html").write_text(shown())
-    context = chromium.new_context()
+    context = browser.new_context()
     tab = context.new_page()
     errors: list[str] = []
     tab.on("pageerror", lambda error: errors.append(str(error)))

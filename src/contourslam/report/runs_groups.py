@@ -39,6 +39,26 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
+class Errors:
+    """Errors of one kind, run by run.
+
+    Attributes
+    ----------
+    name : str
+        Of the figure that shows them.
+    measure, unit : str
+        "relation error", "relation error, rotation" or "position error"; m or °.
+    of : dict of str to ndarray, shape (n,)
+        By the names of the runs, one or more; NaN where they are not known.
+    """
+
+    name: str
+    measure: str
+    unit: str
+    of: dict[str, Floats]
+
+
+@dataclass(frozen=True, slots=True)
 class Pair:
     """Two runs' errors of the same things.
 
@@ -104,6 +124,20 @@ class Group:
             position = np.asarray(np.hypot(apart[:, 0], apart[:, 1]))
             found[run.name] = Difference(stamps - first.stamps.min(), position, np.abs(wrap(apart[:, 2])))
         return found
+
+    def errors(self) -> list[Errors]:
+        """All that runs were judged by: of the whole runs, where there is one, for a part has other errors than all."""
+        runs = [run for run in self.runs if run.name in self.whole] or self.runs
+        relations = {run.name: run.relations.estimate for run in runs if run.relations is not None}
+        distances = {name: known.translation for name, known in relations.items()}
+        turns = {name: np.degrees(known.rotation) for name, known in relations.items()}
+        positions = {run.name: errors for run in runs if (errors := run.position_errors) is not None}
+        found = [
+            Errors("relation_errors", "relation error", "m", distances),
+            Errors("relation_turns", "relation error, rotation", "°", turns),
+            Errors("position_errors", "position error", "m", positions),
+        ]
+        return [errors for errors in found if errors.of]
 
     def pairs(self) -> list[Pair]:
         """Every two runs that compete, by everything that both were judged by."""

@@ -20,6 +20,9 @@ from contourslam.report.runs_groups import Group, grouped
 from contourslam.report.runs_reading import JudgedRun
 from contourslam.report.runs_rows import MEASURES
 
+_LEADING = {("ate", "rmse"): "position error", ("relations", "translation", "mean"): "relation error"}
+"""What the opening words quote, each with what its pairs are called."""
+
 
 def write_runs_report(folder: Path, runs: Sequence[JudgedRun], *, command: str = "") -> dict[str, Any]:
     """Write ``index.html``, ``tables/``, ``figures/`` and ``metrics.json``.
@@ -29,7 +32,8 @@ def write_runs_report(folder: Path, runs: Sequence[JudgedRun], *, command: str =
     Parameters
     ----------
     folder : Path
-        Made where needed; files of the same names are replaced.
+        Made where needed. Files of the same names are replaced, and figures and tables that an earlier comparison left
+        here are removed; all others stay.
     runs : sequence of JudgedRun
         One or more.
     command : str
@@ -47,11 +51,10 @@ def write_runs_report(folder: Path, runs: Sequence[JudgedRun], *, command: str =
     """
     report = RunsReport(folder, tuple(grouped(runs)), command)
     metrics = runs_metrics(report)
-    for part, forms in (("figures", ("svg", "pdf")), ("tables", ("csv", "tex"))):
+    for part in ("figures", "tables"):
         make_folder(folder / part)
-        for form in forms:  # an earlier comparison's would not belong to this one
-            for path in (folder / part).glob(f"*.{form}"):
-                remove(path)
+        for path in report.own_files(part):  # an earlier comparison's would not belong to this one
+            remove(path)
     write_text(folder / "metrics.json", to_json(metrics))
     parts = [
         differs.section(report),
@@ -123,7 +126,7 @@ def _lead(report: RunsReport) -> str:
         return f"{len(runs)} runs of {len(groups)} recordings: {names}. Errors are compared within a recording only."
     drive = f"{groups[0].recording}, {max(run.distance for run in runs):,.0f} m"
     said = f"{len(runs)} run{'s' * (len(runs) > 1)} of one recording ({drive})."
-    for measure in (measure for measure in MEASURES if measure.smaller_wins and measure.unit == "m"):
+    for measure in (measure for measure in MEASURES if measure.keys in _LEADING):
         known = [
             (value, run.name)
             for run, value in zip(runs, measure.values(run.metrics for run in runs), strict=True)
@@ -132,5 +135,7 @@ def _lead(report: RunsReport) -> str:
         if len({measure.text(value) for value, _ in known}) > 1:
             (least, best), (most, worst) = min(known), max(known)
             said += f" {measure.title[0].upper()}{measure.title[1:]}: from {measure.text(least)} m ({best}) "
-            return said + f"to {measure.text(most)} m ({worst}); how sure that is, stands below."
+            said += f"to {measure.text(most)} m ({worst})"
+            pairs = [{one.first, one.second} for one in groups[0].pairs() if one.measure == _LEADING[measure.keys]]
+            return said + ("; how sure that is, stands below." if {best, worst} in pairs else ".")
     return said

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import count
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,10 +28,10 @@ def figures_of(groups: Sequence[Group], width: float) -> Iterator[tuple[str, Fig
     width : float
         Inches.
     """
-    many = sum(len(group.runs) for group in groups) > 1
+    prefixes = iter(_prefixes([run.name for group in groups for run in group.runs]))
     for number, group in enumerate(groups, start=1):
         for run in group.runs:
-            prefix = f"{_file(run.name)}_" if many else ""
+            prefix = next(prefixes)
             for name, figure in _of_run(run, width):
                 yield prefix + name, figure
         suffix = f"_{number}" if len(groups) > 1 else ""
@@ -38,8 +39,17 @@ def figures_of(groups: Sequence[Group], width: float) -> Iterator[tuple[str, Fig
             yield name + suffix, figure
 
 
-def _file(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", name)
+def _prefixes(names: Sequence[str]) -> list[str]:
+    """Give each run's name as the beginning of a file's, numbered where it would be another's; none for one run."""
+    if len(names) == 1:
+        return [""]
+    found = ["relation_", "position_"]  # a run's "errors" would be those of all
+    for name in names:
+        plain = re.sub(r"[^\w.-]+", "_", name)
+        tried = (f"{plain}_{number}_" if number > 1 else f"{plain}_" for number in count(1))
+        taken = [prefix.lower() for prefix in found]
+        found.append(next(prefix for prefix in tried if prefix.lower() not in taken))
+    return found[2:]
 
 
 def _of_run(run: JudgedRun, width: float) -> Iterator[tuple[str, Figure]]:
@@ -62,17 +72,8 @@ def _corrected(run: JudgedRun) -> bool:
 
 
 def _of_group(group: Group, width: float) -> Iterator[tuple[str, Figure]]:
-    relations = {run.name: run.relations.estimate.translation for run in group.runs if run.relations is not None}
-    positions = {run.name: errors for run in group.runs if (errors := run.position_errors) is not None}
-    if relations:
-        yield "relation_errors", distribution_figure(relations, xlabel="relation error (m)", width=width)
-        turns = {
-            run.name: np.degrees(run.relations.estimate.rotation) for run in group.runs if run.relations is not None
-        }
-        label = "relation error, rotation (°)"
-        yield "relation_turns", distribution_figure(turns, xlabel=label, least=1e-3, width=width)
-    if positions:
-        yield "position_errors", distribution_figure(positions, xlabel="position error (m)", width=width)
+    for errors in group.errors():
+        yield errors.name, distribution_figure(errors, width=width)
     if len(group.runs) > 1:
         ways = {run.name: group.moved(at) for at, run in enumerate(group.runs)}
         yield "trajectories", ways_figure(ways, group.runs[0].result.wall_map.end_points, width=width)

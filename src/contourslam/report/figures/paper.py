@@ -15,6 +15,14 @@ def line_style(i: int) -> dict[str, Any]:
     return {"color": colour, "linestyle": dashes}
 
 
+def verbatim(name: str) -> str:
+    """Give a name from outside so that matplotlib shows it as it stands.
+
+    Between two dollar signs it would read mathematics, and it leaves what begins with an underscore out of legends.
+    """
+    return (" " if name.startswith("_") else "") + name.replace("$", r"\$")
+
+
 def legend_below(figure: Figure, axes: Axes, columns: int) -> Figure:
     """Name below the figure what these axes show, in so many columns at most."""
     handles, names = axes.get_legend_handles_labels()

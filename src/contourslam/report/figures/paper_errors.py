@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from contourslam.evaluation.consistency import chi_square_bounds
 from contourslam.evaluation.errors import pose_errors
-from contourslam.report.figures.paper import legend_below, line_style, spread_logarithmic
+from contourslam.report.figures.paper import legend_below, line_style, spread_logarithmic, verbatim
 from contourslam.report.figures.style import BLUE, FAINT, GREY, SINGLE, for_paper
+from contourslam.report.runs_groups import Errors
 from contourslam.report.svg.series import pieces
+from contourslam.report.svg.way import sampled
 from contourslam.slam.result import RunResult
 
 Floats = NDArray[np.float64]
 
-_LEAST = 1e-4
-"""Errors below it are drawn at it, m: a logarithmic scale has no zero."""
+_LEAST = {"m": 1e-4, "°": 1e-3}
+"""Errors below it are drawn at it: a logarithmic scale has no zero."""
 _PIECES = 150
 
 
@@ -42,7 +44,7 @@ def differences_figure(differences: Mapping[str, tuple[Floats, Floats, Floats]],
     scale, unit = (100.0, "cm") if largest >= 0.01 else (1000.0, "mm")
     for i, (name, (times, distance, turn)) in enumerate(differences.items(), start=1):
         for axes, values in ((position, scale * distance), (heading, np.degrees(turn))):
-            axes.plot(*pieces(times, values, _PIECES)[:2], **line_style(i), label=name)
+            axes.plot(*pieces(times, values, _PIECES)[:2], **line_style(i), label=verbatim(name))
     for axes, label in ((position, f"distance ({unit})"), (heading, "turn (°)")):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
@@ -52,19 +54,13 @@ def differences_figure(differences: Mapping[str, tuple[Floats, Floats, Floats]],
 
 
 @for_paper
-def distribution_figure(
-    errors: Mapping[str, Floats], *, xlabel: str, least: float = _LEAST, width: float = SINGLE
-) -> Figure:
+def distribution_figure(errors: Errors, *, width: float = SINGLE) -> Figure:
     """Draw which part of the errors is below a value: the cumulative distribution, over a logarithmic scale.
 
     Parameters
     ----------
-    errors : mapping of str to ndarray, shape (n,)
-        Per run; what is not finite is left out.
-    xlabel : str
-        What they are, with unit.
-    least : float
-        Errors below it count as it: a logarithmic scale has no zero.
+    errors : Errors
+        What is not finite is left out.
     width : float
         Inches.
 
@@ -73,17 +69,18 @@ def distribution_figure(
     Figure
     """
     figure = Figure(figsize=(width, 2.3), layout="constrained")
-    axes = figure.add_subplot()
-    for i, (name, values) in enumerate(errors.items()):
+    axes, least = figure.add_subplot(), _LEAST[errors.unit]
+    for i, (name, values) in enumerate(errors.of.items()):
         known = np.sort(np.maximum(values[np.isfinite(values)], least))
         share = np.arange(1, len(known) + 1) / max(len(known), 1)
         at = np.unique(np.linspace(0, len(known) - 1, 600).astype(np.intp)) if len(known) else np.zeros(0, np.intp)
-        axes.plot(known[at], share[at], **line_style(i), label=name)
-    together = np.concatenate([values[np.isfinite(values)] for values in errors.values()])
+        axes.plot(known[at], share[at], **line_style(i), label=verbatim(name))
+    together = np.concatenate([values[np.isfinite(values)] for values in errors.of.values()])
     if len(together):
         low, high = np.quantile(together, (0.005, 1.0)).tolist()
         axes.set_xlim(max(low, least), max(high, 2.0 * max(low, least)))
     spread_logarithmic(axes, "x")
+    xlabel = f"{errors.measure} ({errors.unit})"
     axes.set(xlabel=xlabel, ylabel="share of the errors below", ylim=(0.0, 1.0))
     return legend_below(figure, axes, 2)
 
@@ -108,7 +105,7 @@ def relation_figure(times: Floats, errors: Mapping[str, Floats], *, width: float
     figure = Figure(figsize=(width, 2.1), layout="constrained")
     axes = figure.add_subplot()
     for i, (name, values) in enumerate(errors.items()):
-        at, middle, low, high = pieces(times, np.maximum(values, _LEAST), 60)
+        at, middle, low, high = pieces(times, np.maximum(values, _LEAST["m"]), 60)
         if i == 0:
             axes.fill_between(at, low, high, color=FAINT, alpha=0.7, linewidth=0.0, label=f"{name}, middle 90 %")
         axes.plot(at, middle, **line_style(i), label=name)
@@ -138,12 +135,14 @@ def truth_figure(result: RunResult, *, aligned: bool = False, width: float = SIN
     panels = figure.subplots(3, 1, sharex=True)
     truth = result.poses if result.truth is None else result.truth
     errors, times = pose_errors(result.poses, truth, aligned=aligned), result.stamps - result.stamps.min()
+    at = sampled(len(times))
     for i, (axes, name, scale) in enumerate(
         zip(panels, ("x (cm)", "y (cm)", "heading (°)"), (100.0, 100.0, math.degrees(1.0)), strict=True)
     ):
         sigma, error = scale * np.sqrt(np.maximum(result.covariances[:, i, i], 0.0)), scale * errors[:, i]
-        axes.fill_between(times, -2.0 * sigma, 2.0 * sigma, color=FAINT, alpha=0.7, linewidth=0.0, label="±2σ")
-        axes.plot(times, error, color=BLUE, linewidth=0.6, label="error")
+        low, high = -2.0 * sigma[at], 2.0 * sigma[at]
+        axes.fill_between(times[at], low, high, color=FAINT, alpha=0.7, linewidth=0.0, label="±2σ")
+        axes.plot(times[at], error[at], color=BLUE, linewidth=0.6, label="error")
         axes.set_ylabel(name)
         known = np.abs(error[np.isfinite(error)])
         limit = 1.25 * max(float(np.quantile(2.0 * sigma, 0.98)), float(np.quantile(known, 0.995)), 1e-6)
@@ -157,8 +156,9 @@ def truth_figure(result: RunResult, *, aligned: bool = False, width: float = SIN
 def nis_figure(runs: Mapping[str, RunResult], *, width: float = SINGLE) -> Figure:
     """Draw the normalised innovation squared per degree of freedom over time, with the band of a consistent filter.
 
-    Each point is the mean over a piece of the run; the band holds 95 % of such means, those of the first run's pieces,
-    were all innovations independent.
+    Each point is the mean over a piece of the run; the band holds 95 % of such means, those of the first filter's
+    pieces, were all innovations independent. The graph's NIS is of contours against wheels, which it takes for worse
+    than they are: well below 1 is usual, it has no band, and the legend says what it is.
 
     Parameters
     ----------
@@ -179,12 +179,14 @@ def nis_figure(runs: Mapping[str, RunResult], *, width: float = SINGLE) -> Figur
         parts = np.array_split(np.argsort(times, kind="stable"), max(1, min(_PIECES, int(used.sum()) // 5)))
         nis, dof = (np.array([column[used][part].sum() for part in parts]) for column in (result.nis, result.nis_dof))
         at = np.array([times[part].mean() for part in parts])
-        if i == 0:
+        graph = result.back_end == "graph"
+        if not (graph or axes.collections):
             low, high = chi_square_bounds(dof)
             name_of_band = "95 %, if consistent"
             axes.fill_between(at, low / dof, high / dof, color=FAINT, alpha=0.7, linewidth=0.0, label=name_of_band)
             axes.axhline(1.0, color=GREY, linewidth=0.5)
-        axes.plot(at, nis / dof, **(line_style(i) | {"linewidth": 0.7}), label=name)
+        label = verbatim(name) + ": contours against wheels" * graph
+        axes.plot(at, nis / dof, **(line_style(i) | {"linewidth": 0.7}), label=label)
     spread_logarithmic(axes, "y")
     axes.set(xlabel="time (s)", ylabel="NIS per degree of freedom")
     return legend_below(figure, axes, 2)

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from contourslam.report.figures.paper import legend_below, line_style
+from contourslam.report.figures.paper import legend_below, line_style, verbatim
 from contourslam.report.figures.style import BLUE, FAINT, GREY, INK, SINGLE, VERMILION, for_paper
 from contourslam.report.figures.world import corner_ellipses, thinned
 from contourslam.slam.landmark_map import CornerMap, WallMap
@@ -68,7 +68,7 @@ def maps_figure(
     panels = list(grid.flat)
     for axes, (name, (walls, corners, poses)) in zip(panels, maps.items(), strict=False):
         _draw_map(axes, walls, corners, poses, small=True)
-        axes.set_title(name)
+        axes.set_title(verbatim(name))
     for axes in panels[len(maps) :]:
         axes.set_visible(False)
     for axes in grid[-1]:
@@ -100,7 +100,9 @@ def ways_figure(ways: Mapping[str, Floats], walls: Floats, *, width: float = SIN
     axes = figure.add_subplot()
     axes.add_collection(LineCollection(list(walls), colors=FAINT, linewidths=0.6, zorder=1.5))
     for i, (name, poses) in enumerate(ways.items()):
-        axes.plot(*thinned(poses)[:, :2].T, **(line_style(i) | {"linewidth": 0.7}), zorder=2 + 0.01 * i, label=name)
+        axes.plot(
+            *thinned(poses)[:, :2].T, **(line_style(i) | {"linewidth": 0.7}), zorder=2 + 0.01 * i, label=verbatim(name)
+        )
     axes.set(xlabel="x (m)", ylabel="y (m)")
     _fit_plane(figure, [axes], width)
     return legend_below(figure, axes, 2)

@@ -29,10 +29,9 @@ class MapFigure {
     this.members = {};
     for (const layer of Object.keys(REACH)) {
       const part = this.panel.group.querySelector(`[data-inside] > [data-layer="${layer}"]`);
-      const data = [...new Set([...part?.children ?? []].map((path) => path.getAttribute("d")))]; // edge and filling are one
       const lines = layer === "walls" || layer === "loops";
-      const found = [...part?.children ?? []].filter((path) => data.includes(path.getAttribute("d"))
-        && data.splice(data.indexOf(path.getAttribute("d")), 1) && (!lines || path.getAttribute("d").includes("l")))
+      const found = [...part?.children ?? []] // edge and filling are one
+        .filter((path) => !path.hasAttribute("data-filling") && (!lines || path.getAttribute("d").includes("l")))
         .flatMap((path) => pathPoints(path).map(([u, v]) => [u, v]));
       this.members[layer] = lines
         ? found.flatMap((point, i) => i % 2 ? [] : [[point, found[i + 1]]]) : found.map((point) => [point]);

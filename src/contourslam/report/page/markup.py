@@ -20,7 +20,7 @@ class Cell:
     small : str
         Put behind it in small print.
     better : bool
-        Marks a number that beats the paper's.
+        Marks a number that beats the paper's, or that is the best of the runs.
     """
 
     text: str

@@ -133,12 +133,17 @@ class Panel {
   }
 }
 
-/** Round numbers between two, about so many. */
+/** Round numbers between two, so many at most where that leaves three: fewer tell no scale. */
 function roundNumbers(low, high, many) {
   const rough = (high - low) / Math.max(2, many), power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((factor) => power * factor >= rough * 0.999);
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  const factors = [10, 5, 2, 1, 0.5, 0.2, 0.1];
+  let found = [];
+  for (const factor of factors.slice(factors.findLastIndex((one) => power * one >= rough * 0.999))) {
+    const step = power * factor;
+    found = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+    if (found.length >= 3) break;
+  }
   return found;
 }
 

@@ -121,9 +121,9 @@ class Axes:
     def squares(self, points: Floats, fill: str, colour: str, size: float = 4.4) -> None:
         """Draw little squares with an edge: they are ends of lines, and so stay as large when the page zooms."""
         at = "".join(paths.dots(self.pixels(points[:, 0], points[:, 1]), self._digits))
-        for stroke, width in ((colour, size), (fill, size - 1.6)):
+        for stroke, width, mark in ((colour, size, ""), (fill, size - 1.6, ' data-filling=""')):
             self._inside.append(
-                f'<path d="{at}" fill="none" stroke="{stroke}" stroke-width="{width:g}" stroke-linecap="square"/>'
+                f'<path d="{at}" fill="none" stroke="{stroke}" stroke-width="{width:g}" stroke-linecap="square"{mark}/>'
             )
 
     def ellipses(self, points: Floats, covariances: Floats, sigmas: float, colour: str) -> None:

@@ -52,7 +52,9 @@ def length(value: float | None) -> str:
 
 def degrees(value: float | None) -> str:
     """Give an angle (rad) in degrees, a dash where it is not known."""
-    return "–" if value is None or not math.isfinite(value) else f"{math.degrees(value):.2f}°"
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{round(math.degrees(value), 2) + 0.0:.2f}°"  # no negative zero
 
 
 def clock(seconds: float) -> str:

@@ -7,7 +7,12 @@ from contourslam.report.page.markup import Cell, Row, Section, paragraph
 from contourslam.report.page.runs.values import RunsReport, differing, flat
 from contourslam.report.runs_reading import JudgedRun
 
-_OF_NO_EFFECT = ("--output", "--overwrite", "--json", "--relations", "--truth", "--config", "--grid", "--rerun")
+_OF_NO_EFFECT = (
+    *("--output", "--overwrite", "--json", "--relations", "--truth", "--config", "--grid", "--rerun"),
+    *("--view", "--view-host", "--view-port"),
+)
+_FLAGS = ("--ignore-odometry", "--keys")
+"""Options that take no value, of those that are told."""
 _PLAIN = {"True": "yes", "False": "no", "None": "none"}
 
 
@@ -39,7 +44,7 @@ def other_options(runs: Sequence[JudgedRun]) -> list[list[str]]:
         for word in _words(str(run.about.get("command", ""))):
             if word.startswith("-"):
                 options.append(word.split("=", 1))
-            elif options:
+            elif options and options[-1][0] not in _FLAGS:  # else it is the recording
                 options[-1].append(word)
         found.append(
             [

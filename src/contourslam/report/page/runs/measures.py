@@ -1,6 +1,7 @@
 """Everything measured, a row per measure and a column per run."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from contourslam.evaluation.metrics import aggregate
 from contourslam.report.page.common import spread
@@ -69,7 +70,7 @@ def _best(measure: Measure, runs: Sequence[JudgedRun], values: list[object], com
 
 
 def _over_recordings(report: RunsReport) -> list[str]:
-    """Mean and spread of each setting that was run on two recordings or more."""
+    """Mean and spread, over the recordings, of each setting that was run on two of them or more."""
     settings: dict[tuple[str, str], list[tuple[str, JudgedRun]]] = {}
     for group in report.groups:
         for run in group.runs:
@@ -86,14 +87,29 @@ def _over_recordings(report: RunsReport) -> list[str]:
             values[at] if name in ("detector", "back_end") else f"{name} {values[at]}" for name, values in names.items()
         ]
         headers.append(", ".join(told) or "all")
-        columns.append(aggregate([run.metrics for _, run in found]))
-    rows = [Row("runs", [Cell(str(len(found))) for found in repeated])]
+        columns.append(aggregate([_average(found, recording) for recording in dict(found)]))
+    rows = [
+        Row("recordings", [Cell(str(len(dict(found)))) for found in repeated]),
+        Row("runs", [Cell(str(len(found))) for found in repeated]),
+    ]
     for measure in MEASURES:
         values = measure.values(columns)
         if any(isinstance(value, dict) for value in values):
             rows.append(Row(measure.name, [_spread(measure, value) for value in values]))
     caption = "Each setting over its recordings: mean and standard deviation"
     return [report.table("spread", caption, headers, rows)]
+
+
+def _average(found: Sequence[tuple[str, JudgedRun]], recording: str) -> dict[str, Any]:
+    """Mean of a setting's runs of a recording: repeated, they are still one drive."""
+
+    def mean(value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return value["mean"] if set(value) == {"mean", "sd", "n"} else {key: mean(one) for key, one in value.items()}
+
+    averaged: dict[str, Any] = mean(aggregate([run.metrics for of, run in found if of == recording]))
+    return averaged
 
 
 def _spread(measure: Measure, value: object) -> Cell:

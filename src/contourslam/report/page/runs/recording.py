@@ -6,19 +6,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.evaluation.bootstrap import PairedDifference
 from contourslam.geometry.poses import transform
 from contourslam.report.figures.paper_errors import differences_figure, distribution_figure
 from contourslam.report.figures.paper_maps import maps_figure, ways_figure
 from contourslam.report.figures.style import DOUBLE
 from contourslam.report.page.common import number
 from contourslam.report.page.markup import Cell, Row, Section, figure, heading, pair, paragraph
+from contourslam.report.page.run.values import degrees
 from contourslam.report.page.runs.values import PX, RunsReport
 from contourslam.report.runs_groups import Group, Pair
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
 Floats = NDArray[np.float64]
 
-_LEAST = {"m": 1e-4, "°": 1e-3}
 _UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 
 
@@ -38,8 +39,7 @@ def _alignment(group: Group) -> str:
         return "All runs stand as they are in the world of the recording's true poses; none was moved."
     moved = []
     for run, motion in zip(group.runs[1:], group.motions[1:], strict=True):
-        turn = math.degrees(motion[2])
-        moved.append(f"{run.name} by {_length(math.hypot(motion[0], motion[1]))} and {turn:.2f}°")
+        moved.append(f"{run.name} by {_length(math.hypot(motion[0], motion[1]))} and {degrees(float(motion[2]))}")
     return (
         f"Each run was moved as a whole, without scale, so that its positions fit those of {first} best in the least "
         f"squares at the scans that both have: {'; '.join(moved)}. The errors in the tables do not depend on it."
@@ -77,31 +77,19 @@ def _ways(report: RunsReport, group: Group) -> str:
 
 
 def _errors(report: RunsReport, group: Group) -> list[str]:
-    runs = [run for run in group.runs if run.name in group.whole] or group.runs  # a part has other errors than all
-    relations = {run.name: run.relations.estimate for run in runs if run.relations is not None}
-    shown = {
-        ("relation_errors", "relation error", "m"): {name: known.translation for name, known in relations.items()},
-        ("relation_turns", "relation error, rotation", "°"): {
-            name: np.degrees(known.rotation) for name, known in relations.items()
-        },
-        ("position_errors", "position error", "m"): {
-            run.name: errors for run in runs if (errors := run.position_errors) is not None
-        },
-    }
     pictures = []
-    for (name, what, unit), found in shown.items():
-        if found:
-            ending = " m" if unit == "m" else unit
-            medians = ", ".join(f"{run} {np.nanmedian(values):.4f}{ending}" for run, values in found.items())
-            pictures.append(
-                report.gallery.add(
-                    report.name(name, group),
-                    distribution_figure(found, xlabel=f"{what} ({unit})", least=_LEAST[unit]),
-                    alt=f"Share of {what}s below a value, one line a run; medians: {medians}",
-                    caption=f"{what[0].upper()}{what[1:]}: share below a value. Medians: {medians}.",
-                    scale=PX,
-                )
+    for errors in group.errors():
+        what, ending = errors.measure, " m" if errors.unit == "m" else errors.unit
+        medians = ", ".join(f"{run} {np.nanmedian(values):.4f}{ending}" for run, values in errors.of.items())
+        pictures.append(
+            report.gallery.add(
+                report.name(errors.name, group),
+                distribution_figure(errors),
+                alt=f"Share of {what}s below a value, one line a run; medians: {medians}",
+                caption=f"{what[0].upper()}{what[1:]}: share below a value. Medians: {medians}.",
+                scale=PX,
             )
+        )
     pairs = group.pairs()
     if not (pictures or pairs):
         return [paragraph("None of these runs was judged by true poses or by known relative poses.", "note")]
@@ -117,9 +105,8 @@ def _pairs(report: RunsReport, group: Group, pairs: list[Pair]) -> list[str]:
         rows = []
         for one in chosen:
             found = one.difference
-            verdict = "first smaller" if found.high < 0.0 else "second smaller" if found.low > 0.0 else "undecided"
             cells = [*(number(round(scale * value, 3) + 0.0, 3) for value in (found.mean, found.low, found.high))]
-            cells += [f"{100 * found.share:.0f} %", f"{found.count:,}", verdict]
+            cells += [f"{100 * found.share:.0f} %", f"{found.count:,}", _verdict(found)]
             rows.append(Row(f"{one.first} − {one.second}", [Cell(cell) for cell in cells]))
         caption = f"First minus second, {measure}: mean difference and its 95 % bootstrap interval"
         caption += "" if len(report.groups) == 1 else f"; {group.recording}"
@@ -127,11 +114,18 @@ def _pairs(report: RunsReport, group: Group, pairs: list[Pair]) -> list[str]:
         tables.append(report.table(name, caption, headers, rows))
     words = (
         "Errors near each other in a drive are alike, so blocks of neighbours are drawn, as long as the root of their "
-        "number (2000 draws, seed 0). The interval tells what other stretches like these of the same drive could have "
+        "number (2000 draws, seed 0); fewer than 100 pairs give too few blocks for an interval. "
+        "The interval tells what other stretches like these of the same drive could have "
         "given. It tells nothing of another building or robot, and of many rows one in twenty is outside by chance. "
         "A difference that is sure may still be too small to matter."
     )
     return [*tables, paragraph(words, "note")]
+
+
+def _verdict(found: PairedDifference) -> str:
+    if math.isnan(found.low):
+        return "too few pairs"
+    return "first smaller" if found.high < 0.0 else "second smaller" if found.low > 0.0 else "undecided"
 
 
 def _maps(report: RunsReport, group: Group) -> str:

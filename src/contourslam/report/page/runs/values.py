@@ -1,6 +1,7 @@
 """What the sections are made from, and where their tables and figures go."""
 
 import dataclasses
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,18 @@ from contourslam.report.runs_reading import JudgedRun
 
 PX = 160.0
 """A figure of one column is shown so many px an inch large: its 8 pt are then as large as the page's words."""
+_NAMES = {
+    "figures": ("trajectories", "differences", "maps", "relation_errors", "relation_turns", "position_errors"),
+    "tables": (
+        "settings",
+        "measures",
+        "spread",
+        "difference_of_relation_error",
+        "difference_of_relation_error_rotation",
+        "difference_of_position_error",
+    ),
+}
+"""What may stand in each folder, beside what is no report's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +57,11 @@ class RunsReport:
     def gallery(self) -> Gallery:
         """Where the figures go."""
         return Gallery(self.folder)
+
+    def own_files(self, part: str) -> list[Path]:
+        """Files in ``figures`` or ``tables`` that go by the names of a report: this one's, or an earlier one's."""
+        own = re.compile(rf"({'|'.join(_NAMES[part])})(_\d+)?\.({'svg|pdf' if part == 'figures' else 'csv|tex'})")
+        return [path for path in (self.folder / part).iterdir() if own.fullmatch(path.name)]
 
     def name(self, what: str, group: Group | None = None) -> str:
         """Name of a file, with the number of the recording where there are several."""
