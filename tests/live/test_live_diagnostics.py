@@ -9,7 +9,7 @@ import pytest
 from contourslam.config import LiveConfig
 from contourslam.live.diagnostics import Condition, Diagnostic, Level, Sensor, diagnose
 from contourslam.live.events import Incident, Reason, Source
-from contourslam.live.figures import Mapped, Rate, Summary
+from contourslam.live.figures import MappedScans, Rate, Summary
 from contourslam.live.tally import MOST, RECENT, Tally
 from contourslam.slam.result import ScanUpdate
 
@@ -192,7 +192,7 @@ def test_rates_are_those_of_the_last_seconds_by_either_clock() -> None:
 
 
 def test_a_summary_forgets_what_is_long_ago() -> None:
-    mapped = Mapped(10.0)
+    mapped = MappedScans(10.0)
     empty = mapped.summary(0.0)
     assert (empty.scans, empty.nis_dof) == (0, 0)
     assert math.isnan(empty.latency_99) and math.isnan(empty.quality) and math.isnan(empty.nis)

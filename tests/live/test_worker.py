@@ -86,8 +86,9 @@ def test_an_error_in_the_thread_is_told_and_stopping_still_works(stream: Callabl
 
 
 def test_who_looks_on_is_told_after_the_pose_is_handed_on_and_works_while_no_scan_waits(
-    stream: Callable[..., Any],
+    stream: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("contourslam.live.worker.OVERDUE", 1e6)
     session = mapping(EKF, LiveConfig(wait=2.0, max_waiting=100), clock=time.monotonic)
     happened: list[tuple[str, float]] = []
     rested = threading.Event()
@@ -112,3 +113,43 @@ def test_who_looks_on_is_told_after_the_pose_is_handed_on_and_works_while_no_sca
     first = [what for what, _ in happened].index("rest")
     assert first >= 18 and [what for what, _ in happened[:first]] == ["handed on", "taken"] * (first // 2)
     assert all(due > 0.0 for what, due in happened if what == "rest")
+
+
+class FakeSession:
+    """One in which a scan always waits, on a clock of its own."""
+
+    def __init__(self, *, mapped: bool) -> None:
+        self.now, self.polls, self._mapped = 0.0, 0, mapped
+
+    def due(self, now: float) -> float:
+        return 0.0
+
+    def poll(self, now: float, *, at_most: int) -> list[Any]:
+        self.now, self.polls = self.now + 0.1, self.polls + 1
+        return ["a scan"] if self._mapped else []
+
+    def close(self) -> None:
+        return None
+
+
+@pytest.mark.parametrize("mapped", [True, False])
+def test_who_looks_on_works_now_and_then_although_scans_always_wait(mapped: bool) -> None:
+    fake, rests, rested = FakeSession(mapped=mapped), [], threading.Event()
+
+    class Watching:
+        def take(self, processed: Any) -> None:
+            assert processed == "a scan"
+
+        def rest(self) -> None:
+            rests.append(fake.polls)
+            if len(rests) == 3:
+                rested.set()
+
+    session: Any = fake
+    worker = Worker(
+        session, lambda processed: None, clock=lambda: fake.now, failed=lambda error: None, onlooker=Watching()
+    )
+    worker.start()
+    assert rested.wait(60.0)
+    worker.stop()
+    assert all(50 <= between <= 52 for between in np.diff([0, *rests[:3]]))  # OVERDUE is 5 s

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.config import Config
 from contourslam.contour.contours import Contours, Floats
@@ -98,6 +99,7 @@ class GraphSlam:
         self._contour = self.memory.contour = ContourOdometry(lidar.max_range, self._first)
         # Of each scan: its keyframe, its pose seen from there, and its covariance in the world as known at the time.
         self._scans: list[tuple[int, Floats, Floats]] = []
+        self._begins: list[int] = []  # of each keyframe of this drive, its first scan
         self.settled: Settled | None = self.memory.settled
         self._finder = LoopFinder(self._places, self._doubt, self._landmarks)
         self._ties: list[tuple[int, Tie]] = []
@@ -149,6 +151,7 @@ class GraphSlam:
             self.settled = None
             kept = Keyframe(scan.stamp, step.pose, oriented.astype(np.float32), self._contour.blur, self._drive)
             self._add_keyframe(step.keyframe, step, kept)
+            self._begins.append(len(self._scans))
             self._lap("graph")
             node = self._nodes[step.anchor]
             count = self._landmarks.take(scan, contours, step.keyframe, self._key_pose, node, self._graph, self._lap)
@@ -193,11 +196,23 @@ class GraphSlam:
         """Whether nothing waits for the next update: to draw up the map then changes nothing in what follows."""
         return self._graph.settled
 
-    def path(self) -> Floats:
-        """Base in the world at each scan as it is seen now, shape (t, 3), for those who draw it."""
-        if not self._scans:
+    def path(self, numbers: NDArray[np.int64] | None = None) -> Floats:
+        """Base in the world at some scans as it is seen now, for those who draw it.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n,), optional
+            Those of the scans, from 0; all by default.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+        """
+        if numbers is None:
+            numbers = np.arange(len(self._scans))
+        if not len(numbers):
             return np.empty((0, 3))
-        return self._along(self._stand() if self.settled is None else self.settled.poses)
+        return self._along(self._stand() if self.settled is None else self.settled.poses, numbers)
 
     def finish(self) -> Finished:
         """Poses of all scans as the graph has them now, refined where the configuration says so, and the loops."""
@@ -218,19 +233,20 @@ class GraphSlam:
             ]
         else:
             poses = poses_of(self._graph.estimate(count), count)
-        return Finished(self._along(poses), np.array(covariances), self.loops())
+        return Finished(self._along(poses, np.arange(len(self._scans))), np.array(covariances), self.loops())
 
-    def _along(self, keys: Floats) -> Floats:
-        """Poses of all scans between those of the keyframes: carried on from the one before, and to the one after."""
-        which = np.array([key for key, _, _ in self._scans])
-        seen = np.array([pose for _, pose, _ in self._scans])
+    def _along(self, keys: Floats, numbers: NDArray[np.int64]) -> Floats:
+        """Poses of scans between those of the keyframes: carried on from the one before, and to the one after."""
+        which = np.array([self._scans[number][0] for number in numbers])
+        seen = np.array([self._scans[number][1] for number in numbers])
         poses = compose(keys[which], seen)
         after = np.minimum(which + 1, len(keys) - 1)
         local = np.array([k.local for k in self._keyframes])
         other = compose(keys[after], between(local[after], compose(local[which], seen)))
-        begin = np.searchsorted(which, which)
-        count = np.searchsorted(which, which, side="right") - begin
-        weight = np.where(after > which, (np.arange(len(which)) - begin) / count, 0.0)
+        begins = np.array([*self._begins, len(self._scans)])
+        begin = begins[which - self._first]
+        count = begins[which - self._first + 1] - begin
+        weight = np.where(after > which, (numbers - begin) / count, 0.0)
         return compose(poses, between(poses, other) * weight[:, None])
 
     def loops(self, first: int = 0) -> tuple[Loop, ...]:

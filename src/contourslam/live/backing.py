@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from contourslam.contour.contours import Floats
-from contourslam.live.outlines import Outlines, outlines
 from contourslam.maps.saved_map import SavedMap
 from contourslam.replay import Stopwatch
 from contourslam.slam.mapper import Mapper
@@ -13,6 +12,10 @@ from contourslam.slam.mapper import Mapper
 
 def _always(mapper: Mapper) -> bool:
     return True
+
+
+def _itself(mapper: Mapper) -> tuple[Mapper, SavedMap | None]:
+    return mapper, None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +39,9 @@ class Backing:
         Make a mapper that continues a saved map, or localises in it.
     write, read : callable or None
         Write a map to a file, atomically, and read it: :func:`contourslam.maps.file.save_map` and ``load_map``.
-    outlines : callable
-        Given a mapper and the version of its map, the contours of its keyframes.
+    standing : callable
+        Given a mapper, the one that works inside it now, and the map in which that localises, or None where it maps;
+        the mapper itself by default.
     fixed : bool
         The map never changes: localisation.
     guesses : bool
@@ -54,7 +58,7 @@ class Backing:
     open: Callable[[SavedMap], Mapper] | None = None
     write: Callable[[Path, SavedMap], None] | None = None
     read: Callable[[Path], SavedMap] | None = None
-    outlines: Callable[[Mapper, int], Outlines] = outlines
+    standing: Callable[[Mapper], tuple[Mapper, SavedMap | None]] = _itself
     fixed: bool = False
     guesses: bool = True
     stopwatch: Stopwatch = field(default_factory=Stopwatch)

@@ -75,7 +75,7 @@ class Summary:
     nis_dof: int
 
 
-class Mapped:
+class MappedScans:
     """What the scans mapped in the last seconds were like; changed in place."""
 
     def __init__(self, remember: float) -> None:

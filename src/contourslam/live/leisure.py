@@ -7,7 +7,7 @@ from pathlib import Path
 from contourslam.config import LiveConfig
 from contourslam.live.autosave import Autosave
 from contourslam.live.backing import Backing
-from contourslam.live.outlines import Outlines
+from contourslam.live.outlines import Outlines, outlines
 from contourslam.live.processed import Drawn
 from contourslam.maps.saved_map import SavedMap
 from contourslam.slam.mapper import Mapper
@@ -63,7 +63,7 @@ class Leisure:
             self.drawn = Drawn(version, mapper.corner_map(), mapper.wall_map())
             self._map_wanted = False
         if self._outlines_wanted and (self.outlines is None or self.outlines.version != version):
-            self.outlines = self._backing.outlines(mapper, version)
+            self.outlines = outlines(*self._backing.standing(mapper), version)
             self._outlines_wanted = False
         saving = self._autosave
         if saving is not None and saving.due(version, now):

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
-from contourslam.live.resuming import Resuming
 from contourslam.maps.saved_map import SavedMap
 from contourslam.slam.mapper import Mapper
 from contourslam.slam.slam import ContourSlam
@@ -34,18 +33,16 @@ class Outlines:
 NONE: tuple[Floats, tuple[NDArray[np.float32], ...]] = np.empty((0, 3)), ()
 
 
-def outlines(mapper: Mapper, version: int, known: SavedMap | None = None) -> Outlines:
+def outlines(mapper: Mapper, known: SavedMap | None, version: int) -> Outlines:
     """Give the keyframes of a mapper: none where it keeps no contours, as the filter does not.
 
     Parameters
     ----------
     mapper : Mapper
-    version : int
-    known : SavedMap, optional
+    known : SavedMap or None
         The map that is localised in; its keyframes are given then.
+    version : int
     """
-    if isinstance(mapper, Resuming):
-        mapper, known = mapper.standing
     if known is not None:
         kept = known.keyframes
         if kept is None:

@@ -14,11 +14,10 @@ from contourslam.live.backing import Backing
 from contourslam.live.course import Course, Step
 from contourslam.live.diagnostics import Condition, Diagnostic, Sensor, diagnose
 from contourslam.live.events import Reason, Released, Source, TimeJump
-from contourslam.live.figures import Mapped, Rate
+from contourslam.live.figures import MappedScans, Rate
 from contourslam.live.leisure import Leisure
 from contourslam.live.outlines import Outlines
 from contourslam.live.processed import Drawn, Processed
-from contourslam.live.resuming import Resuming
 from contourslam.live.smoothing import Smoother
 from contourslam.live.synchroniser import Synchroniser
 from contourslam.maps.saved_map import SavedMap
@@ -83,7 +82,7 @@ class Session:
         self._synchroniser = Synchroniser(waits, odometry_lag=odometry_lag)
         self._smoother = Smoother(config)
         self._rates: dict[Source, Rate] = {"scan": Rate(config.remember), "odometry": Rate(config.remember)}
-        self._mapped = Mapped(config.remember)
+        self._mapped = MappedScans(config.remember)
         self._step: Step | None = None  # that of the last scan
         self._paused, self._version = False, 0
         self._now, self._began = -math.inf, math.nan
@@ -239,8 +238,7 @@ class Session:
             Given the mapper; that of a map that goes on, once it does.
         """
         with self._work:
-            mapper = self._course.mapper
-            return look(mapper.standing[0] if isinstance(mapper, Resuming) else mapper)
+            return look(self._backing.standing(self._course.mapper)[0])
 
     def corner_map(self) -> CornerMap:
         """Corners of the map as they stand now."""

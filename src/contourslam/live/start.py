@@ -10,7 +10,6 @@ from contourslam.contour.contours import Floats
 from contourslam.errors import ConfigError, MapError
 from contourslam.live.backing import Backing
 from contourslam.live.events import Source
-from contourslam.live.outlines import outlines
 from contourslam.live.resuming import Resuming
 from contourslam.live.session import Session
 from contourslam.localization.follow import Localizer
@@ -84,6 +83,9 @@ def mapping(
             raise MapError("this map cannot be continued, it holds landmarks alone; localise in it, or map anew")
         return Resuming(saved, config, live, initial_pose=pose, lidar_mount=lidar_mount, lap=watch)
 
+    def standing(mapper: Mapper) -> tuple[Mapper, SavedMap | None]:
+        return mapper.standing if isinstance(mapper, Resuming) else (mapper, None)
+
     first = None
     if map_file is not None:
         continued = load_map(map_file)
@@ -93,7 +95,7 @@ def mapping(
 
     backing = Backing(
         begin=begin, first=first, lost=lost, localized=lambda m: not isinstance(m, Resuming) or m.localized, keep=keep,
-        open=go_on, write=save_map, read=load_map,
+        open=go_on, write=save_map, read=load_map, standing=standing,
         guesses=config.back_end == "graph" or config.slam.contour_matching, stopwatch=watch,
     )  # fmt: skip
     return Session(
@@ -154,8 +156,7 @@ def localization(
 
     backing = Backing(
         begin=begin, lost=lost, localized=localized, keep=lambda mapper: current, open=open_map, write=save_map,
-        read=load_map, outlines=lambda mapper, version: outlines(mapper, version, current), fixed=True,
-        stopwatch=watch,
+        read=load_map, standing=lambda mapper: (mapper, current), fixed=True, stopwatch=watch,
     )  # fmt: skip
     return Session(
         backing, live, odometry_lag=config.slam.odometry_lag, clock=clock, topics=topics,

@@ -8,6 +8,7 @@ from contourslam.live.session import Processed, Session
 from contourslam.scan import LaserScan, Odometry
 
 LONGEST = 1.0  # s between two looks, for what must be saved
+OVERDUE = 5.0  # s after which what can wait is done although scans wait
 
 
 class Onlooker(Protocol):
@@ -17,7 +18,7 @@ class Onlooker(Protocol):
         """Take in what a scan gave; it has been handed on by then."""
 
     def rest(self) -> None:
-        """Do what can wait: no scan does. Called at least every second in which none comes."""
+        """Do what can wait: no scan does. Called at least every second in which none comes, and some where many do."""
 
 
 class Worker:
@@ -73,6 +74,7 @@ class Worker:
         self._session.close()
 
     def _run(self) -> None:
+        rested = self._clock()
         try:
             while not self._ending.is_set():
                 due = self._session.due(self._clock())
@@ -86,7 +88,10 @@ class Worker:
                 if self._onlooker is not None:
                     for processed in mapped:
                         self._onlooker.take(processed)
-                    if not mapped:
+                    now = self._clock()
+                    waits = self._session.due(now) is not None  # a scan, be it for odometry, or somebody for the map
+                    if not waits or now > rested + OVERDUE:
                         self._onlooker.rest()
+                        rested = self._clock()
         except BaseException as error:  # nobody else hears of it in a thread
             self._failed(error)

@@ -1,5 +1,6 @@
 """Draws up the maps of all lanes, as seldom as must be for the mapping not to wait."""
 
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -11,7 +12,7 @@ PAUSE = 0.25  # s between two maps of one lane, at least
 # So many times as long as it takes to draw a map, no other of the lane is drawn; the last is for a mapping that is
 # to be as fast as it can.
 REST, REST_LOOP, REST_IDLE, REST_PRESSED = 40.0, 5.0, 3.0, 80.0
-LONGEST = 0.04  # s that a map counts for; the first one may have waited for kernels
+LONGEST = 0.04  # s that a lane's first map counts for, at most: it may have waited for kernels
 
 
 class Draughtsman:
@@ -27,7 +28,8 @@ class Draughtsman:
 
     def __init__(self, lanes: Sequence[Lane], memory: Memory, clock: Callable[[], float] = time.monotonic) -> None:
         self._lanes, self._memory, self._clock = lanes, memory, clock
-        self._ended, self._took = [-1e9] * len(lanes), [0.0] * len(lanes)
+        self._ended: list[float | None] = [None] * len(lanes)
+        self._took = [0.0] * len(lanes)
         self._wanted, self._urgent = [False] * len(lanes), [False] * len(lanes)
 
     def want(self, lane: int, urgent: bool, wanted: bool) -> None:
@@ -51,7 +53,8 @@ class Draughtsman:
         for number in range(len(self._lanes)):
             if not (self._wanted[number] and self._lanes[number].at_rest):
                 continue
-            if now >= self._ended[number] + max(PAUSE, self._rest(number, idle, pressed) * self._took[number]):
+            ended, rest = self._ended[number], self._rest(number, idle, pressed)
+            if ended is None or now >= ended + max(PAUSE, rest * self._took[number]):
                 self.draw(number, elapsed)
                 return True
         return False
@@ -75,5 +78,6 @@ class Draughtsman:
         message = pack("map", {"lane": number}, arrays)
         self._memory.add_map(number, elapsed, len(scans), message)
         self._wanted[number] = self._urgent[number] = False
-        self._ended[number] = self._clock()
-        self._took[number] = min(self._ended[number] - began, LONGEST)
+        now = self._clock()
+        self._took[number] = min(now - began, LONGEST if self._ended[number] is None else math.inf)
+        self._ended[number] = now

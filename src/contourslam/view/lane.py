@@ -43,7 +43,7 @@ class Lane:
     Parameters
     ----------
     mapper : Mapper
-        Before its first scan.
+        It may have mapped the scan that is taken in first, and no more of the drive.
     config : Config
         That of the mapper; its detector names the lane.
     mount : ndarray, shape (3,)
@@ -86,7 +86,7 @@ class Lane:
         seconds : mapping of str to float
             CPU time of each stage, s.
         elapsed : float
-            When, s since the first scan.
+            When, s: of a recording since its first scan, of a robot since it began to be followed.
         localized : bool
             Whether the mapper knows where the robot is.
         """
@@ -187,5 +187,6 @@ class Lane:
         """Poses of the knots as they stand now, and ends of the loops: shapes (k, 3) and (n, 2, 2)."""
         if self._graph is None:
             return np.empty((0, 3)), np.empty((0, 2, 2))
-        path = self._graph.path()
-        return path[knots], path[np.array(self._ties, np.int64).reshape(-1, 3)[:, :2], :2]
+        ties = np.array(self._ties, np.int64).reshape(-1, 3)[:, :2]
+        path = self._graph.path(np.concatenate([knots, ties.ravel()]))
+        return path[: len(knots)], path[len(knots) :, :2].reshape(-1, 2, 2)

@@ -112,7 +112,8 @@ class Moment:
     index : int
         Number of the scan, from 0.
     elapsed : float
-        s since the first scan; never less than that of the scan before, whatever the stamps are.
+        s, of a recording since its first scan, of a robot since it began to be followed; never less than that of the
+        scan before, whatever the stamps are.
     made : float
         When it was done, on the clock of ``time.monotonic``, s.
     trace : Trace
