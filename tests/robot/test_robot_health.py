@@ -12,11 +12,12 @@ from contourslam.recordings.picture import Picture
 from contourslam.robot.base.messages import BATTERY_LOW, STALLED, WATCHDOG
 from contourslam.robot.base.odometry import BaseOdometry
 from contourslam.robot.base.states import BaseState
-from contourslam.robot.bring_up import Openers, Robot
+from contourslam.robot.bring_up import READY, Openers, Robot
 from contourslam.robot.device_errors import DeviceError
-from contourslam.robot.health import TURNS, RobotHealth
+from contourslam.robot.health import PICTURES, TURNS, RobotHealth
 from contourslam.scan import LaserScan
 
+JPEG = b"\xff\xd8\xff\xff\xd9"
 SCAN = LaserScan(0.0, np.array([0.0]), np.array([1.0]), np.zeros(1), 0.1, 10.0)
 
 
@@ -45,7 +46,7 @@ def test_each_part_that_the_robot_has_is_told_of() -> None:
     )
     watched.health.watch(SCAN)
     watched.health.watch(state())
-    watched.health.watch(Picture(0.0, b"\xff\xd8\xff\xff\xd9", "jpeg"))
+    watched.health.watch(Picture(0.0, JPEG, "jpeg"))
     said = watched.said()
     assert all(one.level is Level.OK for one in said.values())
     assert said["base"].message == "0.30 m/s, 0.10 rad/s, battery 7.2 V"
@@ -89,6 +90,11 @@ def test_a_part_that_has_fallen_silent_or_failed_is_told_with_what_to_do() -> No
     assert "no turn of the lidar for 2.1 s" in said["lidar"].message and said["lidar"].level is Level.WARN
     assert "no word from the base for 2.1 s" in said["base"].message
 
+    watched.health.watch(Picture(0.0, JPEG, "jpeg"))
+    watched.now += PICTURES + 0.1
+    said = watched.said()["camera"]
+    assert said.message.startswith("no picture for 10.1 s") and said.level is Level.WARN
+
     def gone() -> Any:
         raise DeviceError("/dev/ttyUSB0 is not there; plug it in")
 
@@ -97,3 +103,30 @@ def test_a_part_that_has_fallen_silent_or_failed_is_told_with_what_to_do() -> No
         robot.wait_until_ready()
     (lidar,) = RobotHealth(robot, driven=True)()
     assert lidar == Diagnostic(Level.ERROR, "lidar", "/dev/ttyUSB0 is not there; plug it in")
+
+
+def test_a_part_that_never_spoke_is_told_once_it_has_had_the_time_to_start() -> None:
+    watched = Watched()
+    watched.now = READY - 0.1
+    assert {one.level for one in watched.health()} == {Level.OK}
+    watched.now = READY + 0.1
+    said = watched.said()
+    assert {one.level for one in said.values()} == {Level.WARN}
+    assert "no turn of the lidar for 15.1 s" in said["lidar"].message
+    assert "no word from the base for 15.1 s" in said["base"].message
+    assert "no picture for 15.1 s" in said["camera"].message
+
+
+def test_a_film_that_has_come_to_its_end_is_no_camera_that_is_silent() -> None:
+    film: Any = SimpleNamespace(frames=lambda stopped: iter([Picture(0.0, JPEG, "jpeg")]), close=lambda: None)
+    now = 0.0
+    robot = Robot(Openers(camera=lambda: film))
+    health = RobotHealth(robot, driven=False, clock=lambda: now)
+    with robot:
+        event = robot.next(60.0)
+        assert event is not None
+        health.watch(event)
+        robot._threads["camera"].join()
+        now = 1000.0
+        (camera,) = health()
+    assert camera == Diagnostic(Level.OK, "camera", "1 picture, and no more are kept")

@@ -17,7 +17,7 @@ from contourslam.live.worker import Worker
 from contourslam.replay import replay
 from contourslam.scan import LaserScan, Odometry
 from contourslam.view.followed import Followed
-from contourslam.view.health import PERIOD, Health
+from contourslam.view.health import PERIOD, QUIET, Health
 from contourslam.view.memory import Memory
 from contourslam.view.server import ViewServer
 
@@ -107,7 +107,26 @@ def test_what_is_well_again_is_told() -> None:
     now[0] += PERIOD
     rows[0] = Diagnostic(Level.OK, "scans", "7.0 scans a second")
     health.look()
+    now[0] += QUIET
+    health.look()
     assert told == [("trouble", "scans: 3 scans lost"), ("well", "scans: well again")]
+
+
+def test_what_comes_and_goes_is_told_once() -> None:
+    now, told = [0.0], []
+    rows = [Diagnostic(Level.OK, "base", "0.30 m/s")]
+    health = Health(lambda: rows, lambda what, text: told.append((what, text)), lambda: now[0])
+    for i in range(60):
+        now[0] += PERIOD
+        rows[0] = Diagnostic((Level.OK, Level.WARN, Level.ERROR, Level.WARN)[i % 4], "base", f"look {i}")
+        health.look()
+    assert told == [("trouble", "base: look 1"), ("trouble", "base: look 2")]
+    rows[0] = Diagnostic(Level.WARN, "base", "less")
+    until = now[0] + 3.0 * QUIET
+    while now[0] < until:
+        now[0] += PERIOD
+        health.look()
+    assert told[2:] == [("trouble", "base: less")] and health.trouble == ""
 
 
 def test_a_new_map_begins_the_page_anew_and_time_goes_on(live) -> None:

@@ -20,7 +20,7 @@ from contourslam.scan import LaserScan
 PartName = Literal["lidar", "base", "camera", "recording"]
 Stopped = Callable[[], bool]
 _RETRY = 1.0  # s between two tries to open a part that failed
-_READY = 15.0  # s until each part must have said something: an X4 needs one to turn, a Mega up to three to start
+READY = 15.0  # s until each part must have said something: an X4 needs one to turn, a Mega up to three to start
 
 
 class Lidar(Protocol):
@@ -150,6 +150,7 @@ class Robot(Closing):
         self.state: BaseState | None = None
         self._troubles: dict[PartName, str] = {}
         self._heard: set[PartName] = set()
+        self._ended: set[PartName] = set()
         works: dict[PartName, Callable[[], None]] = {}
         if parts.lidar is not None:
             works["lidar"] = partial(self._lidar, parts.lidar)
@@ -185,6 +186,11 @@ class Robot(Closing):
         """Parts that do not work now, with what is wrong."""
         return dict(self._troubles)
 
+    @property
+    def ended(self) -> frozenset[PartName]:
+        """Parts that have said all they had to say, as a film in the place of a camera."""
+        return frozenset(self._ended)
+
     def drive(self, v: float, omega: float) -> None:
         """Go ahead (m/s) and turn (rad/s); said again at least three times a second, or the base stops.
 
@@ -202,7 +208,7 @@ class Robot(Closing):
             with suppress(DeviceError):
                 base.stop()
 
-    def wait_until_ready(self, stopped: Stopped = lambda: False, *, seconds: float = _READY) -> list[Event]:
+    def wait_until_ready(self, stopped: Stopped = lambda: False, *, seconds: float = READY) -> list[Event]:
         """Wait until the lidar and the base have said something, so that a wrong port is no surprise on the way.
 
         Parameters
@@ -254,6 +260,7 @@ class Robot(Closing):
                 try:
                     work()
                     if name == "camera":  # a film or a folder has come to its end; what is live goes on until the end
+                        self._ended.add(name)
                         return
                 except ContourslamError as error:
                     self._tell(name, str(error))

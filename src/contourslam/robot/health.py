@@ -8,15 +8,18 @@ from contourslam.recordings.picture import Picture
 from contourslam.robot.base.health import BaseHealth, base_values, motion_words
 from contourslam.robot.base.mega import MegaBase
 from contourslam.robot.base.states import BaseState
-from contourslam.robot.bring_up import Event, PartName, Robot
+from contourslam.robot.bring_up import READY, Event, PartName, Robot
 from contourslam.robot.lidar.ydlidar_x4 import YdlidarX4
 from contourslam.scan import LaserScan
 
-TURNS = 2.0  # s without a turn of the lidar that are worth a word; it turns six times a second or more
+# s without a turn of the lidar, or without a picture, that are worth a word; the former come six times a second or
+# more, and of the latter as few as one in some seconds may be wanted.
+TURNS, PICTURES = 2.0, 10.0
+CHECK = "check its plug, its cable and its power"
 
 
 class RobotHealth:
-    """Watches the robot's events; asked from another thread, it never waits.
+    """Watches the robot's events; asked from another thread, it never waits. Made as the robot is started.
 
     Parameters
     ----------
@@ -29,7 +32,7 @@ class RobotHealth:
 
     def __init__(self, robot: Robot, *, driven: bool, clock: Callable[[], float] = time.monotonic) -> None:
         self._robot, self._driven, self._clock = robot, driven, clock
-        self._base = BaseHealth()
+        self._base, self._began = BaseHealth(), clock()
         self._heard: dict[PartName, float] = {}
         self._counts: dict[PartName, int] = {}
 
@@ -57,7 +60,12 @@ class RobotHealth:
         )
 
     def _silent(self, part: PartName) -> float:
-        return self._clock() - self._heard.get(part, self._clock())
+        """Time since a part spoke, or since the start, s."""
+        return self._clock() - self._heard.get(part, self._began)
+
+    def _too_long(self, part: PartName, seconds: float) -> bool:
+        """Whether a part has been silent for that long; one that has never spoken may have to be started first."""
+        return self._silent(part) > (seconds if part in self._heard else READY)
 
     def _lidar(self) -> Diagnostic:
         lidar, values = self._robot.lidar, {"turns": str(self._counts.get("lidar", 0))}
@@ -70,13 +78,15 @@ class RobotHealth:
                 "opened anew": str(lidar.reconnections),
             }
             message += f", {parser.bad / max(parser.good + parser.bad, 1):.1%} of its packets damaged"
-        if (silent := self._silent("lidar")) > TURNS:
-            message = f"no turn of the lidar for {silent:.1f} s; check its plug, its cable and its power"
+        if self._too_long("lidar", TURNS):
+            message = f"no turn of the lidar for {self._silent('lidar'):.1f} s; {CHECK}"
             return Diagnostic(Level.WARN, "lidar", message, values)
         return Diagnostic(Level.OK, "lidar", message, values)
 
     def _of_base(self) -> Diagnostic:
         base, state = self._robot.base, self._base.state
+        if state is None and self._too_long("base", READY):
+            return Diagnostic(Level.WARN, "base", f"no word from the base for {self._silent('base'):.1f} s; {CHECK}")
         if state is None:
             return Diagnostic(Level.OK, "base", "starting")
         values = base_values(base, state) if isinstance(base, MegaBase) else {}
@@ -87,4 +97,10 @@ class RobotHealth:
 
     def _camera(self) -> Diagnostic:
         number = self._counts.get("camera", 0)
-        return Diagnostic(Level.OK, "camera", f"{number} picture{'s' * (number > 1)}" if number else "starting")
+        message = f"{number} picture{'s' * (number > 1)}" if number else "starting"
+        if "camera" in self._robot.ended:
+            return Diagnostic(Level.OK, "camera", f"{message}, and no more are kept")
+        if self._too_long("camera", PICTURES):
+            silent = self._silent("camera")
+            return Diagnostic(Level.WARN, "camera", f"no picture for {silent:.1f} s; check its plug and its cable")
+        return Diagnostic(Level.OK, "camera", message)

@@ -81,6 +81,7 @@ class Followed:
             "duration": None,
             "mount": self._mount,
             "live": True,
+            "map": 0,  # counts them: what was chosen in one means nothing in the next
             "max_false_negative_rate": config.slam.max_false_negative_rate,
         }
         painter = Painter(config, [make_detector(config.detector, adapted=config.adapted)])
@@ -97,7 +98,7 @@ class Followed:
         """
         self._mount = np.asarray(mount, dtype=np.float64)
         self._about["mount"] = self._mount
-        self._memory.clear()  # pages are told anew
+        self._forget()
         self._session = session
         return self
 
@@ -139,7 +140,7 @@ class Followed:
     def _begin(self, mapper: Mapper) -> None:
         """Go on with another mapper, whose map is another one or goes on from where the robot was found."""
         if self._lane is not None:
-            self._memory.clear()
+            self._forget()
             if isinstance(mapper, Localizer):
                 text = "the robot is looked for in the map"
             elif isinstance(self._lane.mapper, Localizer):
@@ -149,6 +150,11 @@ class Followed:
             self._memory.add_event(self._elapsed(), "begun", text)
         self._lane = Lane(mapper, self._config, self._mount)
         self._keeper = Keeper((self._lane,), self._memory, self._clock)
+
+    def _forget(self) -> None:
+        """Go on with another map, and have the pages told of it."""
+        self._about["map"] += 1
+        self._memory.clear()
 
     def _elapsed(self) -> float:
         """Time since all began, s, on a clock that nobody sets."""

@@ -8,6 +8,7 @@ from typing import Any
 from contourslam.live.diagnostics import Diagnostic, Level
 
 PERIOD = 0.5  # s
+QUIET = 5.0  # s that something must be better until that is told: what comes and goes is told once
 WORDS = {Level.OK: "ok", Level.WARN: "warning", Level.ERROR: "error"}
 
 
@@ -34,6 +35,7 @@ class Health:
         self._asked = -1e9
         self._known: tuple[Diagnostic, ...] = ()
         self._began: dict[str, Diagnostic] = {}  # of what is wrong, the words that it began with
+        self._better: dict[str, float] = {}  # of what is wrong, since when it is less so, or not at all
 
     def look(self) -> tuple[Diagnostic, ...]:
         """Give how all is, half a second old at most."""
@@ -58,12 +60,18 @@ class Health:
         return "; ".join(d.message for d in began if d.level is Level.ERROR)
 
     def _compare(self) -> None:
+        now = self._clock()
         for new in self._known:
             before = self._began.get(new.name)
+            known = Level.OK if before is None else before.level
+            if new.level >= known:
+                self._better.pop(new.name, None)
+            if new.level == known or (new.level < known and now < self._better.setdefault(new.name, now) + QUIET):
+                continue
+            self._better.pop(new.name, None)
             if new.level is Level.OK:
-                if before is not None:
-                    del self._began[new.name]
-                    self._tell("well", f"{new.name}: well again")
-            elif before is None or before.level is not new.level:
+                del self._began[new.name]
+                self._tell("well", f"{new.name}: well again")
+            else:
                 self._began[new.name] = new
                 self._tell("trouble", f"{new.name}: {new.message}")

@@ -1,5 +1,7 @@
 """What is wrong with the base, in words, and the figures that show how it works."""
 
+import threading
+
 from contourslam.robot.base.mega import MegaBase
 from contourslam.robot.base.messages import IMPOSSIBLE_STEP, STALLED, WATCHDOG
 from contourslam.robot.base.states import BaseState
@@ -8,7 +10,7 @@ SILENT = 0.5  # s without a word of the base that are worth one
 
 
 class BaseHealth:
-    """Collects what states tell between two questions; changed in place.
+    """Collects what states tell between two questions; changed in place. One thread may tell, and another ask.
 
     Attributes
     ----------
@@ -19,11 +21,13 @@ class BaseHealth:
     def __init__(self) -> None:
         self.state: BaseState | None = None
         self._flags, self._slipped = 0, False
+        self._lock = threading.Lock()  # held for moments; a flag between reading and clearing would be lost
 
     def take(self, state: BaseState) -> None:
         """Take in a state."""
-        self.state = state
-        self._flags, self._slipped = self._flags | state.flags, self._slipped or state.odometry.slipping
+        with self._lock:
+            self.state = state
+            self._flags, self._slipped = self._flags | state.flags, self._slipped or state.odometry.slipping
 
     def warnings(self, silent: float, *, driven: bool = False) -> list[str]:
         """Say what is wrong, of all that came since this was asked last.
@@ -35,8 +39,9 @@ class BaseHealth:
         driven : bool
             Commands should come all the time, so that a watchdog that stops the base is news.
         """
-        flags, slipped, state = self._flags, self._slipped, self.state
-        self._flags, self._slipped = 0, False
+        with self._lock:
+            flags, slipped, state = self._flags, self._slipped, self.state
+            self._flags, self._slipped = 0, False
         if state is None:
             return []
         found = {
