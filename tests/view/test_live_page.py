@@ -98,9 +98,15 @@ def test_a_new_map_begins_the_page_anew_and_a_dropped_connection_catches_up(live
     with ViewServer(robot.followed.show, lag=robot.followed.lag) as server:
         page = opened(server)
         wait(page, "contourslam.drawn === 29")
+        wait(page, "contourslam.model.maps[0]?.corner_ids.length > 3")
+        page.fill("#goto", str(page.evaluate("contourslam.model.maps[0].corner_ids[0]")))
+        page.keyboard.press("Enter")
+        wait(page, "contourslam.selected && contourslam.model.story?.times.length > 0")
         robot.session.reset()
         robot.go(10)
         wait(page, "contourslam.drawn === 9")
+        assert page.evaluate("contourslam.selected") is None  # the new map's corner of that number is another
+        wait(page, "document.querySelector('#cornercard').hidden")
         assert page.evaluate("contourslam.model.knots") == len(robot.followed.show.memory.knots(0))
         assert any("another map is begun" in text for text in page.locator("#events li").all_inner_texts())
         port = server.port

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from contourslam.view.knots import Knot
+from contourslam.view.knots import LANE_COLUMNS, Knot
 from contourslam.view.memory import Memory
 from contourslam.view.moment import Moment, Trace
 
@@ -12,7 +12,7 @@ def moment(index: int, points: int = 100) -> Moment:
 
 
 def knot(index: int) -> Knot:
-    return Knot(index, np.zeros(7, np.float32), np.zeros((1, 6), np.float32), np.zeros((3, 2), np.int16))
+    return Knot(index, np.zeros(7, np.float32), np.zeros((1, LANE_COLUMNS), np.float32), np.zeros((3, 2), np.int16))
 
 
 def test_every_moment_is_found_at_its_time() -> None:

@@ -3,6 +3,8 @@
 import math
 import time
 
+import pytest
+
 from contourslam.view.pace import Pace
 from contourslam.view.server import ViewServer
 
@@ -145,3 +147,20 @@ def test_every_control_has_a_name_and_can_be_reached_by_keys(served, opened, wai
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.id || document.activeElement.tagName"))
     assert {"play", "time", "speed", "fit", "theme", "goto"} <= reached
+
+
+def test_the_band_of_consistency_holds_what_an_honest_filter_gives(served, opened, wait) -> None:
+    _, server = served(40)
+    page = opened(server)
+    wait(page, f"{STATE} === 'finished' && contourslam.drawn === 39")
+    band = page.evaluate(
+        "import('./series.js').then(({ honest }) => honest([Float32Array.of(24, 0), Float32Array.of(60, 0)])"
+        ".map((line) => [...line].map((v) => Number.isNaN(v) ? null : v)))"
+    )
+    # Quantiles of chi square with 24 degrees of freedom at 2.5 and 97.5 %, 12.401 and 39.364.
+    assert band == [[pytest.approx(12.401 / 24, abs=3e-3), None], [pytest.approx(39.364 / 24, abs=3e-3), None]]
+    together = page.evaluate(
+        "import('./series.js').then(({ together }) => { const { ratio, dof } = together("
+        "Float32Array.of(1, NaN, 2, 3), Float32Array.of(2, 0, 6, 2), 2); return [[...ratio], [...dof]]; })"
+    )
+    assert together == [[1.0, 1.0, 2.0, 2.25], [2.0, 2.0, 6.0, 8.0]]

@@ -87,11 +87,6 @@ def test_it_is_drawn_at_speed_without_a_backlog_and_can_be_scrubbed_and_asked(in
         assert inked(page) > 10
         # Nothing had been queued: what was on its way, a scan that was being mapped, and the newest.
         assert len(diary.rows) - then <= UNDRAWN + 2
-        # Nor did the page fall farther and farther behind: its lag is of the same kind as at first.
-        third = len(diary.rows) // 3
-        assert third > 5
-        first, last = (sorted(rows)[third // 2] for rows in (diary.rows[:third], diary.rows[-third:]))
-        assert last <= 3.0 * first + 1.0
 
         page.evaluate("const s = document.querySelector('#time'); s.value = 30; s.dispatchEvent(new Event('input'))")
         wait(page, "Math.abs(contourslam.model.frame.elapsed - 30) < 1")

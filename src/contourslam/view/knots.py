@@ -14,7 +14,7 @@ WAY, TURN = 0.25, math.radians(12.0)  # m and rad between two
 INK = 220  # contour points kept of each, at most
 UNIT = 0.002  # m; a point is kept as two integers of 16 bits, up to 65 m away
 FARTHEST = 32767.0  # units
-LANE_COLUMNS = 6  # x, y, heading; standard deviation, m; NIS by degrees of freedom; quality
+LANE_COLUMNS = 7  # x, y, heading; standard deviation, m; NIS by degrees of freedom; quality; degrees of freedom
 UNKNOWN = (math.nan,) * 3
 
 
@@ -84,4 +84,5 @@ def _columns(update: ScanUpdate) -> list[float]:
     """One lane's numbers."""
     sigma = math.sqrt(max(update.covariance[0, 0] + update.covariance[1, 1], 0.0))
     nis = update.nis / update.nis_dof if update.nis_dof else math.nan
-    return [*update.pose.tolist(), sigma, nis, math.nan if update.quality is None else update.quality]
+    quality = math.nan if update.quality is None else update.quality
+    return [*update.pose.tolist(), sigma, nis, quality, update.nis_dof]

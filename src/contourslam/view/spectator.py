@@ -13,11 +13,12 @@ from contourslam.view.knots import UNIT
 from contourslam.view.knots_message import knots_message
 from contourslam.view.lag import Lag
 from contourslam.view.moment import Moment
+from contourslam.view.own_time import counted
 from contourslam.view.requests import Request, RequestError, parse
 from contourslam.view.show import Show
 from contourslam.view.wire import pack
 
-PERIOD = 1.0 / 30.0  # s between two frames
+PERIOD, LONGEST = 1.0 / 30.0, 1.0  # s between two frames, at least, and at most where the page draws them
 STATUS, STORY = 0.25, 1.0  # s
 # Frames that may be on their way, to a page that draws fast and to one that does not; further ones wait, and only the
 # newest of them is ever sent.
@@ -50,6 +51,8 @@ class Spectator:
         self._turn = 0.0  # s from sending to drawing, of late
         self._index, self._began = -1, time.monotonic()
         self._status_at = self._story_at = 0.0
+        self._frame_at = 0.0  # when the next may be sent
+        self._spent = 0.0  # s of CPU time that the last frame took, with all that was sent before it
         self._story: tuple[int, int] | None = None
 
     async def serve(self) -> None:
@@ -63,12 +66,12 @@ class Spectator:
                 self._cursor.advance(now - last)
                 last = now
                 self._asked.clear()
-                began = time.thread_time()
-                await self._send(now)
-                spent = time.thread_time() - began  # what other pages took meanwhile is counted too, on the safe side
-                pressed = self._show.pace is None or self._show.pace.pressed
-                period = max(PERIOD, self._lag.pages * spent / SHARE) if pressed else PERIOD
-                left = period - (time.monotonic() - now)
+                await self._send_news(now)
+                if now >= self._frame_at:
+                    self._spent = 0.0
+                    await counted(self._send(now), self._count)
+                    self._frame_at = now + self._period
+                left = min(self._frame_at, self._status_at + STATUS) - time.monotonic()
                 try:
                     await asyncio.wait_for(self._asked.wait(), max(left, 0.001))
                 except TimeoutError:
@@ -77,6 +80,15 @@ class Spectator:
             return
         finally:
             listening.cancel()
+
+    def _count(self, seconds: float) -> None:
+        self._spent += seconds
+
+    @property
+    def _period(self) -> float:
+        """Time between two frames, s; bounded, for the first sending may be large and the next ones are not."""
+        pressed = self._show.pace is None or self._show.pace.pressed
+        return min(max(PERIOD, self._lag.pages * self._spent / SHARE), LONGEST) if pressed else PERIOD
 
     async def _listen(self) -> None:
         try:
@@ -98,6 +110,7 @@ class Spectator:
         else:
             self._cursor.obey(request, ended=self._show.status()["state"] == "finished")
             self._status_at = 0.0
+        self._frame_at = 0.0
         self._asked.set()
 
     @property
@@ -105,6 +118,8 @@ class Spectator:
         return len(self._show.about["lanes"])
 
     def _drawn(self, index: int) -> None:
+        if all(frame != index for frame, _, _ in self._undrawn):
+            return  # one from before the last hello
         now = time.monotonic()
         while self._undrawn:
             frame, sent, made = self._undrawn.popleft()
@@ -114,16 +129,21 @@ class Spectator:
             if frame == index:
                 return
 
-    async def _send(self, now: float) -> None:
-        """Send what the page lacks."""
-        send, memory = self._connection.send, self._show.memory
-        if self._epoch != memory.epoch:
-            self._epoch, self._knots, self._index = memory.epoch, 0, -1
+    async def _send_news(self, now: float) -> None:
+        """Say that all begins anew where it does, and now and then how all is."""
+        if self._epoch != self._show.memory.epoch:
+            self._epoch, self._knots, self._index = self._show.memory.epoch, 0, -1
             self._maps, self._events, self._status_at = [0] * self._lanes, 0, 0.0  # the page forgets all at a hello
-            await send(pack("hello", {"about": self._show.about, "unit": UNIT}))
+            self._undrawn.clear()  # also that a frame has come, so that it would never say that it has drawn it
+            self._frame_at = 0.0
+            await self._connection.send(pack("hello", {"about": self._show.about, "unit": UNIT}))
         if now >= self._status_at + STATUS:
             self._status_at = now
             await self._send_status()
+
+    async def _send(self, now: float) -> None:
+        """Send the frame, and before it what else the page lacks."""
+        send, memory = self._connection.send, self._show.memory
         if len(self._undrawn) >= (UNDRAWN if self._turn < SLOW else UNDRAWN_SLOW):
             return
         moment = self._cursor.moment()

@@ -19,7 +19,7 @@ const store = {
 const model = new Model();
 const camera = new Camera(() => { toolbar(); ask(); });
 const layers = Object.fromEntries(LAYERS.map(([key, , , on]) => [key, store.get(`layer.${key}`, String(on)) === "true"]));
-let maps = [], selected = null, undrawn = null, drawn = null, asked = false, panelsAt = 0, panelsWait = null, statusNew = false;
+let maps = [], selected = null, undrawn = null, drawn = null, asked = false, panelsAt = 0, panelsWait = null, statusNew = false, mapNumber;
 
 const link = new Link({
   message(message) {
@@ -40,9 +40,10 @@ const link = new Link({
 const send = (...request) => link.send(...request);
 const transport = new Transport(model, send);
 
-/** The connection is new: all that was known is sent again. */
+/** The connection is new, or another map is begun: all that is known is sent again. */
 function hello() {
   const { about } = model;
+  undrawn = null; // the frame is forgotten, and the server waits for it no longer
   $("title").textContent = `${about.title} · ${about.back_end === "ekf" ? "EKF" : about.back_end}`;
   document.title = `${about.title} – contourslam`;
   $("waiting").hidden = false;
@@ -52,8 +53,9 @@ function hello() {
   }
   transport.begin(about.live);
   const same = maps.map((map) => map.name).join() === about.lanes.join();
+  if (!same || about.map !== mapNumber) selected = null;
+  mapNumber = about.map;
   if (!same) {
-    selected = null;
     maps = about.lanes.map((name, lane) => new LaneMap(lane, name, camera, choose));
     $("lanes").replaceChildren(...maps.map((map) => map.figure));
     $("lanes").dataset.count = $("stage").dataset.count = maps.length;
@@ -62,7 +64,7 @@ function hello() {
   maps.forEach((map) => map.forget());
   model.events = [];
   $("events").replaceChildren();
-  if (selected) send("story", selected.id, { lane: selected.lane });
+  send("story", selected ? selected.id : -1, { lane: selected ? selected.lane : 0 });
 }
 
 /** Draw at the next chance. */

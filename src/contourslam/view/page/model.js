@@ -1,6 +1,6 @@
 // What the page knows: all that the server has said so far.
 
-const ROW = 7, LANE = 6; // numbers a knot has, and has for each lane
+const ROW = 7, LANE = 7; // numbers a knot has, and has for each lane
 
 /** An array of numbers that grows. */
 class Growing {
@@ -99,11 +99,11 @@ export class Model {
     return out;
   }
 
-  /** One number of each knot up to now: "time", "sigma", "nis", "quality", "error". */
+  /** One number of each knot up to now: "time", "sigma", "nis", "dof", "quality", "error". */
   series(what, lane) {
     const n = this.shown, out = new Float32Array(n);
     const rows = this.rows.data, poses = this.poses.data;
-    const column = { sigma: 3, nis: 4, quality: 5 }[what];
+    const column = { sigma: 3, nis: 4, quality: 5, dof: 6 }[what];
     for (let i = 0; i < n; i++) {
       const at = LANE * (i * this.lanes + lane), row = ROW * i;
       if (what === "time") out[i] = rows[row];

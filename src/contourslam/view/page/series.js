@@ -3,7 +3,7 @@
 import { begin, minutes, tidy } from "./charts.js";
 import { colour, laneColour } from "./colours.js";
 
-/** Lines over time, one a lane; `band` is shaded, `log` counts by powers of ten. */
+/** Lines over time, one a lane; `band`, a lower and an upper line, is shaded; `log` counts by powers of ten. */
 export function drawSeries(canvas, times, lines, { band = null, log = null, factor = 1 } = {}) {
   const area = begin(canvas);
   if (!area) return;
@@ -23,7 +23,11 @@ export function drawSeries(canvas, times, lines, { band = null, log = null, fact
   if (band) {
     ctx.fillStyle = colour("good");
     ctx.globalAlpha = 0.13;
-    ctx.fillRect(left, y(band[1]), right - left, y(band[0]) - y(band[1]));
+    const known = Array.from(times.keys()).filter((i) => i % Math.ceil(n / 400) === 0 && band[0][i] >= 0);
+    ctx.beginPath();
+    for (const i of known) ctx.lineTo(x(times[i]), y(band[1][i]));
+    for (const i of known.reverse()) ctx.lineTo(x(times[i]), y(band[0][i]));
+    ctx.fill();
     ctx.globalAlpha = 1;
   }
   ctx.strokeStyle = colour("grid");
@@ -67,15 +71,28 @@ export function drawSeries(canvas, times, lines, { band = null, log = null, fact
   });
 }
 
-/** Running mean over `width` values; what is missing stays missing. */
-export function smooth(values, width) {
-  const out = new Float32Array(values.length);
+/** NIS by degrees of freedom of the last `width` knots together, and how many degrees that are. */
+export function together(nis, dof, width) {
+  const n = nis.length, ratio = new Float32Array(n), degrees = new Float32Array(n);
   let sum = 0, count = 0;
-  for (let i = 0; i < values.length; i++) {
-    if (values[i] >= 0) { sum += values[i]; count += 1; }
+  for (let i = 0; i < n; i++) {
+    if (dof[i] > 0) { sum += nis[i] * dof[i]; count += dof[i]; }
     const gone = i - width;
-    if (gone >= 0 && values[gone] >= 0) { sum -= values[gone]; count -= 1; }
-    out[i] = count ? sum / count : NaN;
+    if (gone >= 0 && dof[gone] > 0) { sum -= nis[gone] * dof[gone]; count -= dof[gone]; }
+    ratio[i] = count ? sum / count : NaN;
+    degrees[i] = count;
   }
-  return out;
+  return { ratio, dof: degrees };
+}
+
+/** The band that holds 95 % of an honest filter's, at each knot for the lane with the fewest degrees of freedom. */
+export function honest(degrees) {
+  const least = degrees[0].map((_, i) => Math.min(...degrees.map((of) => of[i] || Infinity)));
+  return [-1, 1].map((sign) => least.map((dof) => (dof < Infinity ? quantile(dof, sign * 1.96) : NaN)));
+}
+
+/** Of chi square by its degrees of freedom, `z` standard deviations off: Wilson and Hilferty, 1931. */
+function quantile(dof, z) {
+  const variance = 2 / (9 * dof);
+  return Math.max(1 - variance + z * Math.sqrt(variance), 0) ** 3;
 }
