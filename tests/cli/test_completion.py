@@ -48,7 +48,7 @@ def test_bash_completes_commands_options_and_choices(tab) -> None:
     assert tab("run", "drive.b") == []
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
 def test_the_script_of_each_shell_is_sound(shell: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", shell]) == 0
     said = capsys.readouterr()

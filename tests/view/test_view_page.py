@@ -16,7 +16,7 @@ def test_it_draws_what_was_mapped_and_a_corner_tells_its_story(served, opened, w
     page = opened(server)
     wait(page, f"{STATE} === 'finished' && contourslam.drawn === 39 && contourslam.model.maps[0]")
     assert inked(page) > 10
-    assert page.inner_text("#state") == "mapped to the end"
+    wait(page, "document.querySelector('#state').innerText === 'mapped to the end'")
     assert "circle" in page.inner_text("#title")
     assert page.locator("#pose tbody tr").count() == 1
     assert page.locator("#errorcard").is_visible()  # the recording has true poses
@@ -92,7 +92,7 @@ def test_a_dropped_connection_is_opened_again_and_everything_catches_up(replayed
         wait(page, "contourslam.model.frame?.index > 5")
         port = server.port
     wait(page, "document.querySelector('#link').dataset.on === 'no'")
-    assert page.inner_text("#state") == "not connected"
+    wait(page, "document.querySelector('#state').innerText === 'not connected'")
     one.pace.set_speed(math.inf)
     until(lambda: one.player.state == "finished")
     assert page.evaluate("contourslam.model.frame.index") < 59

@@ -21,7 +21,7 @@ class Completion:
     Example: contourslam completion bash
     """
 
-    shell: tyro.conf.Positional[Literal["bash", "zsh", "tcsh"]] = "bash"
+    shell: tyro.conf.Positional[Literal["bash", "zsh"]] = "bash"
     """For which shell."""
 
     def execute(self, command: str) -> int:
@@ -36,7 +36,7 @@ def script(shell: str) -> str:
     Parameters
     ----------
     shell : str
-        "bash", "zsh" or "tcsh".
+        "bash" or "zsh".
 
     Returns
     -------
