@@ -1,7 +1,9 @@
 """Helpers for every folder: rooms made of line segments, a ray caster in plain NumPy, contours made by hand."""
 
 import math
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from contourslam.contour import Contours
 from contourslam.scan import LaserScan
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 Floats = NDArray[np.float64]
 Rooms = Callable[..., Floats]
 Scans = Callable[..., LaserScan]
@@ -94,3 +97,16 @@ def contour_of() -> Callable[..., Contours]:
 @pytest.fixture(scope="session")
 def corner_of() -> Callable[..., Floats]:
     return _corner_of
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A real browser, skipped where there is none; for the tests of a file, for two at once cannot be in a process."""
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
+    with api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield found
+        found.close()

@@ -1,7 +1,6 @@
 """A robot that drives a circle in a room with a box, without a simulator; players and servers over it."""
 
 import math
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -20,7 +19,6 @@ from contourslam.view.pace import Pace
 from contourslam.view.replayed import Replayed
 from contourslam.view.server import ViewServer
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SETTINGS = Config(back_end="ekf", slam=SlamConfig(walls=True, contour_matching=True))
 
 
@@ -137,19 +135,6 @@ class LiveRobot:
 def live(drive) -> Callable[..., LiveRobot]:
     """Robots on the drive."""
     return lambda scans=40, **more: LiveRobot(drive(scans), **more)
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """One for all tests: to start it takes longer than any of them."""
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    options = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
-    with api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
-        yield found
-        found.close()
 
 
 @pytest.fixture
