@@ -8,7 +8,7 @@ import numpy as np
 
 from contourslam.atomic import write_text
 from contourslam.errors import ResultError
-from contourslam.nearest import unreadable
+from contourslam.report.csv_table import read_lines, wrong_header
 from contourslam.slam.result import Loop
 
 _POSE = ("x", "y", "theta")
@@ -65,16 +65,9 @@ def read_loop_table(path: Path) -> tuple[Loop, ...]:
     """
     if not path.exists():
         return ()
-    try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except OSError as error:
-        raise ResultError(unreadable(path, error)) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ResultError(f"{path}: is not a table of loops ({error})") from error
+    lines = read_lines(path, "loops")
     if not lines or tuple(lines[0]) != COLUMNS:
-        raise ResultError(
-            f"{path}: line 1 is not the header of a table of loops; write it again with `contourslam run`"
-        )
+        raise wrong_header(path, "loops")
     loops = []
     for number, line in enumerate(lines[1:], start=2):
         try:

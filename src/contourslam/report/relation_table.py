@@ -1,16 +1,13 @@
 """The error of each known relative pose as a plain table."""
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contourslam.atomic import write_text
-from contourslam.errors import ResultError
 from contourslam.evaluation.relations import JudgedRelations, RelationErrors
-from contourslam.nearest import unreadable
+from contourslam.report.csv_table import numbers_of, read_lines, wrong_header
 
 RELATIONS = "relation_errors.csv"
 _WHO = (("", "estimate"), ("online_", "online"), ("odometry_", "odometry"))
@@ -50,26 +47,14 @@ def read_relation_table(path: Path, metrics: dict[str, Any]) -> JudgedRelations:
     ResultError
         If the file cannot be read, or a line of it is not as it was written; the message names the line.
     """
-    try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except OSError as error:
-        raise ResultError(unreadable(path, error)) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ResultError(f"{path}: is not a table of relations ({error})") from error
+    lines = read_lines(path, "relations")
     names = lines[0] if lines else []
     known = [(prefix, field) for prefix, field in _WHO if f"{prefix}translation" in names]
     expected = ["earlier_stamp", "later_stamp"]
     expected += [f"{prefix}{part}" for prefix, _ in known for part in ("translation", "rotation")]
     if names != expected or {"estimate", "odometry"} - {field for _, field in known}:
-        raise ResultError(
-            f"{path}: line 1 is not the header of a table of relations; write it again with `contourslam run`"
-        )
-    values = np.empty((len(lines) - 1, len(names)))
-    for number, line in enumerate(lines[1:]):
-        try:
-            values[number] = [float(field) for field in line]
-        except ValueError as error:
-            raise ResultError(f"{path}: line {number + 2} must hold {len(names)} numbers") from error
+        raise wrong_header(path, "relations")
+    values = numbers_of(path, lines)
     errors = {}
     for at, (prefix, field) in enumerate(known):
         told = metrics.get(f"{prefix}relations")

@@ -1,15 +1,12 @@
 """A run's per-scan record as a plain table, so that it can be evaluated and drawn again without its recording."""
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.atomic import write_text
-from contourslam.errors import ResultError
-from contourslam.nearest import unreadable
+from contourslam.report.csv_table import numbers_of, read_lines, wrong_header
 from contourslam.slam.landmark_map import CornerMap, WallMap
 from contourslam.slam.result import RunResult
 
@@ -90,23 +87,11 @@ def read_scan_table(path: Path) -> tuple[RunResult, NDArray[np.float64] | None]:
     ResultError
         If the file is missing, or a line of it is not as it was written; the message names the line.
     """
-    try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except OSError as error:
-        raise ResultError(unreadable(path, error)) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ResultError(f"{path}: is not a table of scans ({error})") from error
+    lines = read_lines(path, "scans")
     names = tuple(lines[0]) if lines else ()
     if names != COLUMNS + tuple(name for group in _OPTIONAL if group[0] in names for name in group):
-        raise ResultError(
-            f"{path}: line 1 is not the header of a table of scans; write it again with `contourslam run`"
-        )
-    values = np.empty((len(lines) - 1, len(names)))
-    for number, line in enumerate(lines[1:]):
-        try:
-            values[number] = [float(field) for field in line]
-        except ValueError as error:
-            raise ResultError(f"{path}: line {number + 2} must hold {len(names)} numbers") from error
+        raise wrong_header(path, "scans")
+    values = numbers_of(path, lines)
     table = dict(zip(names, values.T, strict=True))
     return _result(table), table.get(_READINGS[0])
 
