@@ -13,11 +13,12 @@ ROOT = PACKAGE.parents[1]
 
 # Each room may import the rooms before it. Adapters and shared ground stand at the ends.
 GROUND = ("errors", "nearest", "display", "closing", "atomic", "settings_file", "config", "kernels", "geometry", "scan")
-LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "replay")
+LINE = ("contour", "detectors", "landmarks", "matching", "slam", "maps", "localization", "graph", "joining", "replay")
 ORDER = (
     *GROUND,
     *LINE,
     "live",
+    "fleet",
     "recordings",
     "robot",
     "scene",
@@ -43,8 +44,23 @@ EXTRAS = {
     "mpl_toolkits",
     "evo",
     "scipy",
+    "dask",
+    "distributed",
+    "fsspec",
+    "pyarrow",
 }
-MAY_USE_EXTRAS = ("graph", "robot", "scene", "simulation", "evaluation", "experiments", "report", "view")
+MAY_USE_EXTRAS = (
+    "graph",
+    "joining",
+    "fleet",
+    "robot",
+    "scene",
+    "simulation",
+    "evaluation",
+    "experiments",
+    "report",
+    "view",
+)
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
