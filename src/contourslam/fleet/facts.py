@@ -143,7 +143,7 @@ class Answer:
     missing : tuple of int
         Later ones that are not here though later yet ones are, the first few.
     common : int
-        Number of the common map that the run belongs to; runs of the same number share a frame. Grows, never used again.
+        Number of the common map that the run belongs to; runs of the same number share a frame. It grows.
     members : tuple of str
         Robots whose maps are joined there, this one among them.
     keyframe : int
