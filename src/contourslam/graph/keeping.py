@@ -36,15 +36,32 @@ def kept(slam: GraphSlam, about: Mapping[str, str]) -> SavedMap:
     SavedMap
         Its keyframes are in the frame of the map, which is the world of the first drive.
     """
-    memory, settled = slam.memory, slam.settled
+    return keep(slam.memory, slam.settled, about)
+
+
+def keep(memory: Memory, settled: Settled | None, about: Mapping[str, str]) -> SavedMap:
+    """Everything that a memory holds, as it is kept; it may grow on.
+
+    Parameters
+    ----------
+    memory : Memory
+    settled : Settled or None
+        Its keyframes as a refinement found them; None for the map as it stands.
+    about : mapping of str to str
+        What people want to know of the map.
+
+    Returns
+    -------
+    SavedMap
+    """
     count = len(memory.keyframes)
     if settled is None:
         nodes, poses = memory.landmarks.nodes, poses_of(memory.graph.estimate(count), count)
         spreads = [memory.doubt.from_start(node, pose) for node, pose in zip(nodes, poses, strict=True)]
         settled = Settled(poses, np.array(spreads).reshape(-1, 3, 3))
+    covariances = settled.covariances
     return SavedMap(
-        slam.corner_map(),
-        slam.wall_map(),
+        *memory.landmarks.maps(settled.poses, lambda keys: covariances[keys]),
         _contoured(memory.keyframes, settled),
         _relations(memory, settled),
         _seen(memory, settled.poses),
@@ -174,11 +191,37 @@ def resume(
     ConfigError
         If the configuration names a detector that does not exist.
     """
+    detector = detector or make_detector(config.detector, adapted=config.adapted)
+    mount = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
+    memory = remember(config, saved, detector, mount)
+    return GraphSlam(
+        config, detector, initial_pose=initial_pose, lidar_mount=mount, lap=lap, memory=memory, doubt=covariance
+    )
+
+
+def remember(config: Config, saved: SavedMap, detector: Detector, mount: Floats) -> Memory:
+    """Give the memory of a graph that knows all that a map holds; :func:`keep` is its inverse.
+
+    Parameters
+    ----------
+    config : Config
+    saved : SavedMap
+    detector : Detector
+    mount : ndarray, shape (3,)
+        ``T_base_lidar``; like the detector, of drives that are to come.
+
+    Returns
+    -------
+    Memory
+
+    Raises
+    ------
+    MapError
+        If the map does not hold what binds its keyframes.
+    """
     keyframes, relations, seen, stretches = saved.keyframes, saved.relations, saved.seen, saved.stretches
     if not keyframes or relations is None or seen is None or stretches is None:
         raise MapError(NOT_CONTINUABLE)
-    detector = detector or make_detector(config.detector, adapted=config.adapted)
-    mount = np.array(config.lidar.mount if lidar_mount is None else lidar_mount, dtype=np.float64)
     memory = Memory(config, detector, mount)
     memory.keyframes += _keyframes(keyframes)
     _bind(memory, keyframes.poses, relations)
@@ -186,9 +229,7 @@ def resume(
     _put(memory, stretches, keyframes.poses)
     memory.landmarks.recall(seen, nodes, keyframes.poses)
     memory.settled = Settled(keyframes.poses, keyframes.covariances)
-    return GraphSlam(
-        config, detector, initial_pose=initial_pose, lidar_mount=mount, lap=lap, memory=memory, doubt=covariance
-    )
+    return memory
 
 
 def _keyframes(kept: Contoured) -> list[Keyframe]:
