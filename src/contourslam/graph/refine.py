@@ -16,7 +16,7 @@ from contourslam.matching.small import invert
 REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
 MOST_TIES = 3  # places a keyframe is held against
 APART = 3  # places before and after a keyframe's own that are not: their contours made its pose in the first place
-ROUNDS = 1
+STILL = 0.01  # m that no keyframe moves farther than in a round after which no other is needed
 LEAST_OVERLAP = 0.6
 # What the solution so far is taken to know, and how far a tie may contradict it: m, m, rad.
 SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
@@ -24,7 +24,7 @@ PRIOR = np.diag(1.0 / SIGMA**2)
 
 
 def refine(
-    graph: PoseGraph, keyframes: list[Keyframe], places: Places | None, sightings: Sightings
+    graph: PoseGraph, keyframes: list[Keyframe], places: Places | None, sightings: Sightings, rounds: int = 1
 ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     """Solve the graph at once, tie every keyframe anew to the places around it and to all landmarks, and solve again.
 
@@ -37,6 +37,8 @@ def refine(
         Are moved to where they come to lie; None to tie no keyframe to a place seen before.
     sightings : Sightings
         Of corners and walls.
+    rounds : int
+        Of tying and solving, at most: several where parts lie farther off each other than a tie may contradict.
 
     Returns
     -------
@@ -49,12 +51,14 @@ def refine(
     count = len(keyframes)
     factors = joined(graph.factors, graph.ties)
     values = solve(factors, graph.estimate(count))
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         poses = poses_of(values, count)
         seen, landmarks = relations(find_landmark_set(sightings, poses), sightings, poses)
         landmarks.insert(values)
         factors = joined(graph.factors) if places is None else joined(graph.factors, _ties(keyframes, poses, places))
         values = keyframes_of(solve(joined(factors, seen), landmarks), count)
+        if np.abs((poses_of(values, count) - poses)[:, :2]).max() < STILL:
+            break
     return factors, values
 
 

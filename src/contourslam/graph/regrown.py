@@ -43,7 +43,10 @@ def regrow(
         known_from = None if best is None else int(relations.first[best])
         node = 0 if known_from is None else nodes.get(known_from, of_keyframes[known_from])
         if key in places or known_from is None:
-            covariance = FLOOR if best is None else _covariance(relations, best, pose)
+            if best is None:  # the first of a map that was merged into another hangs on ties alone
+                covariance = FLOOR + keyframes.covariances[key] if key else FLOOR
+            else:
+                covariance = _covariance(relations, best, pose)
             nodes[key] = doubt.add(node, pose, covariance)
             first = known_from is None or keyframes.drives[known_from] < keyframes.drives[key]
             node = nodes[key] if first else node
