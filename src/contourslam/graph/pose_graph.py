@@ -125,6 +125,11 @@ class PoseGraph:
         self._catch_up()
         return to_array(self._isam.calculateEstimatePose2(key))
 
+    def covariance(self, key: int) -> Floats:
+        """Marginal covariance of one variable, in the world's axes, shape (3, 3)."""
+        angle = self.pose(key)[2]
+        return turned(np.asarray(self._isam.marginalCovariance(key)), float(angle))
+
     def poses(self, keys: Sequence[int]) -> Floats:
         """Estimates of several variables, shape (n, 3)."""
         self._catch_up()
