@@ -48,21 +48,28 @@ class TurningAngle:
 
 
 SHOWN = 200  # the scan whose picture is drawn
-run = simulate(ROOMS["furnished_room"], SimulationConfig(duration=40.0), seed=1)
-config = told(Config(), run.lidar)
-scan = [message for message in run.messages() if isinstance(message, LaserScan)][SHOWN]
-_, columns = plt.subplots(1, 2, figsize=(9.0, 4.0), sharey=True, layout="constrained")
-detectors = {"matched filter": make_detector("matched_filter"), "turning angle": TurningAngle()}
-for axes, (name, detector) in zip(columns, detectors.items(), strict=True):
-    result = replay(run.messages(), config, detector, lidar_mount=run.lidar_mount)
-    assert result.truth is not None
-    error = rmse(result.poses, result.truth)
-    print(f"{name:15s} RMSE x {error.x:.4f} m, y {error.y:.4f} m, heading {error.theta:.4f} rad", end="; ")
-    print(f"{len(result.corner_map.ids)} corners")
 
-    found = detect(scan, detector, config)
-    points = axes.scatter(*found.curve.points.T, c=found.response, s=9, vmin=0.0)
-    axes.scatter(*found.corners.positions.T, marker="s", s=90, facecolor="none", edgecolor="tab:red")
-    axes.set(title=f"{name}, scan {SHOWN}", aspect="equal")
-    plt.colorbar(points, ax=axes, label="response", shrink=0.8)
-plt.show()
+
+def main() -> None:
+    run = simulate(ROOMS["furnished_room"], SimulationConfig(duration=40.0), seed=1)
+    config = told(Config(), run.lidar)
+    scan = [message for message in run.messages() if isinstance(message, LaserScan)][SHOWN]
+    _, columns = plt.subplots(1, 2, figsize=(9.0, 4.0), sharey=True, layout="constrained")
+    detectors = {"matched filter": make_detector("matched_filter"), "turning angle": TurningAngle()}
+    for axes, (name, detector) in zip(columns, detectors.items(), strict=True):
+        result = replay(run.messages(), config, detector, lidar_mount=run.lidar_mount)
+        assert result.truth is not None
+        error = rmse(result.poses, result.truth)
+        print(f"{name:15s} RMSE x {error.x:.4f} m, y {error.y:.4f} m, heading {error.theta:.4f} rad", end="; ")
+        print(f"{len(result.corner_map.ids)} corners")
+
+        found = detect(scan, detector, config)
+        points = axes.scatter(*found.curve.points.T, c=found.response, s=9, vmin=0.0)
+        axes.scatter(*found.corners.positions.T, marker="s", s=90, facecolor="none", edgecolor="tab:red")
+        axes.set(title=f"{name}, scan {SHOWN}", aspect="equal")
+        plt.colorbar(points, ax=axes, label="response", shrink=0.8)
+    plt.show()
+
+
+if __name__ == "__main__":  # a sweep takes the detector from this file, and nothing else
+    main()
