@@ -28,6 +28,7 @@ from contourslam.simulation.simulate import simulate
 class TurningAngle:
     """Turn of the contour between the chords before and after each point, in half turns."""
 
+    adapted: bool = True  # whether to use adaptations to range noise; this one has none
     equalized: bool = True  # hand me contours of equal steps, not the raw points
     threshold: float = 0.2  # 36 degrees
     side: float = 0.25  # length of the two chords, m
