@@ -13,7 +13,15 @@ DOCUMENTS = sorted(
 )
 """Every document that becomes a page of the site."""
 
-ELSEWHERE = ("with ROS 2", "on the robot", "on a Raspberry Pi", "on your computer", "with the firmware", "minutes")
+ELSEWHERE = (
+    "with ROS 2",
+    "on the robot",
+    "on a Raspberry Pi",
+    "on your computer",
+    "with the firmware",
+    "on a cluster",
+    "minutes",
+)
 """Titles of blocks that cannot be run here, or take too long: their commands are only held against the real parser."""
 SERVES = "until Ctrl-C"
 """Title of a block whose commands serve until Ctrl-C."""
@@ -24,7 +32,7 @@ FOLLOWED = tuple(f"docs/how_to/{name}.md" for name in ("own_detector", "nav2", "
 """Documents whose blocks a newcomer runs in a clone of his own: once is enough."""
 
 _BLOCK = re.compile(
-    r"^(?P<indent> *)```(?P<kind>bash|python)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$"
+    r"^(?P<indent> *)```(?P<kind>bash|python|toml)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^(?P=indent)```$"
     r"(?:\s*^(?P=indent)```text\n(?P<shown>.*?)^(?P=indent)```$)?",
     re.MULTILINE | re.DOTALL,
 )
@@ -33,7 +41,7 @@ _NEEDS = re.compile(r"<!-- needs: (.*?) -->")
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A block of a document: "bash" or "python", its title, its lines without what they are indented by.
+    """A block of a document: "bash", "python" or "toml", its title, its lines without what they are indented by.
 
     `shown` is the block of text that follows at once: what the reader is told that this one prints.
     """
@@ -46,12 +54,12 @@ class Block:
     @property
     def file(self) -> bool:
         """Whether the title names a file that the block is the content of."""
-        return bool(re.fullmatch(r"[\w./-]+\.(py|yaml|sh)", self.title))
+        return bool(re.fullmatch(r"[\w./-]+\.(py|yaml|sh|toml)", self.title))
 
     @property
     def run(self) -> bool:
         """Whether it is run where it stands."""
-        return self.title in ("", SERVES)
+        return self.title in ("", SERVES) and self.kind != "toml"
 
     def lines(self) -> list[str]:
         """Commands of a block of the shell, one each, lines that go on joined."""

@@ -23,6 +23,7 @@ COMMANDS = {
     "scene": "Make a 3-D model of a map, coloured from the camera's pictures.",
     "evaluate": "Judge one or more result folders.",
     "compare": "Compare runs, or the landmark detectors, and write the report.",
+    "sweep": "Run an experiment of many runs, on every core or a cluster.",
     "figures": "Draw figures of runs for a paper, as SVG and PDF.",
     "localize": "Follow a robot through a recording in a known map.",
     "locate": "Find a robot in a known map from one scan.",

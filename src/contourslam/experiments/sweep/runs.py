@@ -151,6 +151,14 @@ class Run:
         return columns | {"source": "simulation", **{name: getattr(drive, name) for name in names}}
 
     @property
+    def order(self) -> tuple[object, ...]:
+        """Sorted by this, runs of one drive that share scans follow each other."""
+        drive = self.drive
+        if isinstance(drive, RecordedDrive):
+            return ()
+        return drive.lidar, drive.beams or 0, -1.0 if drive.noise is None else drive.noise
+
+    @property
     def name(self) -> str:
         """Say in words which run it is."""
         drive = self.drive

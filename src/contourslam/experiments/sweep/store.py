@@ -11,6 +11,7 @@ A run that is done twice by accident is written to the same place twice, so ever
 """
 
 import json
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from contourslam.atomic import write_bytes
 from contourslam.errors import ContourslamError, ResultError
 from contourslam.experiments.sweep.extras import require
 from contourslam.experiments.sweep.files import is_local, open_place
-from contourslam.experiments.sweep.rows import DONE, Row, table_of
+from contourslam.experiments.sweep.rows import DONE, FAILED, Row, table_of
 
 _AT_ONCE = 16  # files read side by side: elsewhere, each is a wait
 
@@ -90,11 +91,18 @@ class Store:
         parquet.write_table(table_of([row]), sink)
         self._write(_part(row["key"], row["status"]), sink.getvalue().to_pybytes())
         if row["status"] == DONE:
-            self._remove(_part(row["key"], "failed"))
+            self._remove(_part(row["key"], FAILED))
 
-    def has(self, key: str) -> bool:
-        """Whether the run is done; not whether it failed."""
-        return bool(self._system.exists(f"{self._root}/{_part(key, DONE)}"))
+    def status_of(self, key: str) -> str | None:
+        """``done`` or ``failed`` where the run has a row of its own; None where it has not."""
+        there = (status for status in (DONE, FAILED) if self._system.exists(f"{self._root}/{_part(key, status)}"))
+        return next(there, None)
+
+    def forget_failed(self, keys: Iterable[str]) -> None:
+        """Remove rows of runs that failed and are to be done again."""
+        failed = {key for key, status in self._parts() if status == FAILED}
+        for key in failed & set(keys):
+            self._remove(_part(key, FAILED))
 
     def status(self) -> dict[str, str]:
         """``done`` or ``failed`` of every run that has a row, by its key; cheap."""
