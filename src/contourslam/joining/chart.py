@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from contourslam.contour.contours import Floats, Ints
 from contourslam.errors import MapError
 from contourslam.geometry.poses import between, compose, inverse, transform
+from contourslam.joining.overlay import Surfaces, surfaces_of
 from contourslam.localization.known_map import KnownMap
-from contourslam.localization.view import SQUARE, View, view_of
+from contourslam.localization.view import View, view_of
 from contourslam.maps.saved_map import Contoured, SavedMap
 from contourslam.matching.cell_map import CellMap
 from contourslam.matching.certainty import Hold, hold
@@ -89,6 +90,11 @@ class Chart:
     def known(self) -> KnownMap:
         """The map to be localised in."""
         return KnownMap(self.saved)
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """Its surfaces and where it is empty."""
+        return surfaces_of(self.frames, np.arange(len(self.frames)), self.frames.poses)
 
     def contour(self, keyframe: int) -> Floats:
         """Contour points and normals of a keyframe in its frame, shape (n, 4)."""
@@ -191,10 +197,3 @@ def _among(known: Constellation, back: Floats, points: Floats) -> Constellation:
         known.normals[walls] + back[2],
         ends[walls],
     )
-
-
-def squares_of(points: Floats) -> Ints:
-    """Rows of `points` that are the first of their square of 0.2 m and of the direction that they look in."""
-    octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5) % 8
-    keys = np.column_stack([np.floor(points[:, :2] / SQUARE), octants])
-    return np.sort(np.unique(keys, axis=0, return_index=True)[1])

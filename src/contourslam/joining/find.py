@@ -1,12 +1,44 @@
 """Two maps that know nothing of each other: whether they overlap, and how."""
 
+import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from contourslam.contour.contours import Floats
+from contourslam.geometry.angles import wrap
+from contourslam.geometry.poses import between_one, compose_one, inverse, transform
 from contourslam.joining.chart import Chart
-from contourslam.joining.joint import Apart, Joint
+from contourslam.joining.joint import Apart, Evidence, Joint, Reason, Tie
+from contourslam.joining.laying import Laid, lay, thinned
 from contourslam.joining.looks import Look, look, turned_round
+from contourslam.joining.overlay import Overlay, Tally, surfaces_of
+from contourslam.joining.refound import refound
+from contourslam.joining.rivals import best_rival, elsewhere
+from contourslam.joining.ties import ties_of, turned_tie
 
 Observer = Callable[[int, int], None]
+
+LIKELY = -10.0  # log-odds of a look from which it is worth a try
+TRIED = 8  # ways of laying that are tried
+AGREE, AGREE_ANGLE, DRIFT = 0.3, math.radians(3.0), 0.02  # two looks that agree: m, rad, and m more per m between
+# What a joint needs. Measured over maps that are known to be related or not: docs/joining.md.
+LEAST_WORTH = 25.0  # m of surfaces that both maps have, less twice those that one saw through
+LEAST_WAY = 4.0  # m
+MOST_CONTRADICTED = 0.03
+MOST_RIVAL = 0.6
+ALIKE = 5.0  # m; from what worth on two maps have something alike
+
+
+@dataclass(frozen=True, slots=True)
+class _Hypothesis:
+    """A way of laying the second map on the first."""
+
+    laid: Laid
+    overlay: Overlay
+    tally: Tally
+    looks: tuple[Look, ...]
 
 
 def find_joint(first: Chart, second: Chart, *, observer: Observer | None = None) -> Joint | Apart:
@@ -21,6 +53,7 @@ def find_joint(first: Chart, second: Chart, *, observer: Observer | None = None)
     Returns
     -------
     Joint or Apart
+        That of the maps in the other order is its inverse.
     """
     looks: list[Look] = []
     count = len(first.stretches) + len(second.stretches)
@@ -49,4 +82,136 @@ def decide(first: Chart, second: Chart, looks: Iterable[Look]) -> Joint | Apart:
     -------
     Joint or Apart
     """
-    return Apart("nothing alike")
+    if _size(second) > _size(first):  # the smaller is laid on the larger, whatever the order
+        return inverted(_decided(second, first, [turned_round(each, first, second) for each in looks]))
+    return _decided(first, second, list(looks))
+
+
+def _size(chart: Chart) -> tuple[int, int, float]:
+    return len(chart.frames), len(chart.frames.points), float(chart.way[-1])
+
+
+def _decided(first: Chart, second: Chart, looks: list[Look]) -> Joint | Apart:
+    keyframes = thinned(second)
+    found: list[_Hypothesis] = []
+    for group in _groups(second, looks)[:TRIED]:
+        if any(_in(hypothesis, group[0], second) for hypothesis in found):
+            continue
+        laid = lay(first, second, [(each.keyframe, each.pose) for each in group], keyframes)
+        if laid.fits.any():
+            overlay = Overlay(first.surfaces, surfaces_of(second.frames, laid.keyframes, laid.poses))
+            found.append(_Hypothesis(laid, overlay, overlay.tally(np.zeros(3)), tuple(group)))
+    if not found:
+        return Apart("nothing alike")
+    found.sort(key=lambda hypothesis: -hypothesis.tally.worth)
+    best = found[0]
+    others = [other.tally.worth for other in found[1:] if _differs(best.laid, other.laid, second)]
+    rival = max([best_rival(best.overlay), *others, 0.0]) / max(best.tally.worth, 1e-9)
+    joint = _joint(first, second, best, min(rival, 1.0))
+    reason = _reason(best.tally, joint.evidence)
+    return joint if reason is None else Apart(reason, joint)
+
+
+def _groups(second: Chart, looks: list[Look]) -> list[list[Look]]:
+    """Looks that agree, those first of which most speaks for; each look is in one group."""
+    rest = sorted((each for each in looks if each.odds > LIKELY), key=lambda each: (-each.odds, each.view, each.back))
+    groups: list[list[Look]] = []
+    while rest:
+        group = [rest.pop(0)]
+        grown = True
+        while grown:
+            agreeing = [each for each in rest if any(_agree(second, each, other) for other in group)]
+            rest = [each for each in rest if not any(each is other for other in agreeing)]
+            group += agreeing
+            grown = bool(agreeing)
+        groups.append(group)
+    return sorted(groups, key=lambda group: -_support(group))
+
+
+def _support(group: list[Look]) -> float:
+    """Sum of what speaks for the looks of a group, of each view once."""
+    views: dict[tuple[int, bool], float] = {}
+    for each in group:
+        views[each.view, each.back] = max(views.get((each.view, each.back), -math.inf), each.odds - LIKELY)
+    return sum(views.values())
+
+
+def _agree(second: Chart, one: Look, other: Look) -> bool:
+    own = between_one(second.frames.poses[one.keyframe], second.frames.poses[other.keyframe])
+    off = between_one(compose_one(one.pose, own), other.pose)
+    near = math.hypot(off[0], off[1]) < AGREE + DRIFT * math.hypot(own[0], own[1])
+    return near and abs(off[2]) < AGREE_ANGLE
+
+
+def _in(hypothesis: _Hypothesis, new: Look, second: Chart) -> bool:
+    """Whether a look is one that a hypothesis already has."""
+    laid = hypothesis.laid
+    at = np.flatnonzero(laid.keyframes == new.keyframe)
+    at = at if len(at) else np.array([np.argmin(np.abs(laid.keyframes - new.keyframe))])
+    key = int(laid.keyframes[at[0]])
+    own = between_one(second.frames.poses[key], second.frames.poses[new.keyframe])
+    if not laid.fits[at[0]] or math.hypot(own[0], own[1]) > 2.0:
+        return False
+    return not bool(elsewhere(between_one(compose_one(laid.poses[at[0]], own), new.pose)))
+
+
+def _differs(laid: Laid, other: Laid, second: Chart) -> bool:
+    """Whether two ways of laying a map contradict each other, more than it may be bent in between."""
+    own = second.frames.poses
+    mine, theirs = laid.keyframes[laid.fits], other.keyframes[other.fits]
+    apart = np.hypot(*(own[mine][:, None, :2] - own[theirs][None, :, :2]).transpose(2, 0, 1))
+    i, j = np.unravel_index(int(apart.argmin()), apart.shape)
+    expected = compose_one(laid.poses[laid.fits][i], between_one(own[mine[i]], own[theirs[j]]))
+    off = between_one(expected, other.poses[other.fits][j])
+    shrunk = max(1.0 - DRIFT * float(apart[i, j]) / max(math.hypot(off[0], off[1]), 1e-9), 0.0)
+    return bool(elsewhere(np.array([shrunk * off[0], shrunk * off[1], off[2]])))
+
+
+def _joint(first: Chart, second: Chart, best: _Hypothesis, rival: float) -> Joint:
+    laid, tally = best.laid, best.tally
+    corners, walls = refound(first, second, laid)
+    way = _way(second, laid)
+    evidence = Evidence(corners, walls, tally.agreeing, tally.contradicted, way, rival)
+    method = max(best.looks, key=lambda each: each.odds).method
+    return Joint(_pose(second, laid), ties_of(first, second, laid), evidence, method)
+
+
+def _way(second: Chart, laid: Laid) -> float:
+    """Length of the way between keyframes that follow each other and both fit, m."""
+    steps = np.diff(second.way[laid.keyframes])
+    both = laid.fits[1:] & laid.fits[:-1] & (np.diff(second.frames.drives[laid.keyframes]) == 0)
+    return float(steps[both & (steps < 2.0)].sum())
+
+
+def _pose(second: Chart, laid: Laid) -> Floats:
+    """Rigid motion that lays all keyframes best that fit."""
+    own, there = second.frames.poses[laid.keyframes[laid.fits]], laid.poses[laid.fits]
+    turns = wrap(there[:, 2] - own[:, 2])
+    turn = float(np.arctan2(np.sin(turns).sum(), np.cos(turns).sum()))
+    middle = transform(np.array([0.0, 0.0, turn]), own[:, :2].mean(axis=0))
+    return np.array([*(there[:, :2].mean(axis=0) - middle), turn])
+
+
+def _reason(tally: Tally, evidence: Evidence) -> Reason | None:
+    """Why not to join; None where nothing speaks against it."""
+    if tally.agreeing < ALIKE:
+        return "nothing alike"
+    if evidence.contradicted > MOST_CONTRADICTED:
+        return "contradicted"
+    if evidence.rival > MOST_RIVAL:
+        return "ambiguous"
+    if tally.worth < LEAST_WORTH or evidence.way < LEAST_WAY:
+        return "too little"
+    return None
+
+
+def inverted(found: Joint | Apart) -> Joint | Apart:
+    """Give what was found out about two maps with the first for the second."""
+    if isinstance(found, Apart):
+        return Apart(found.reason, None if found.best is None else _inverted(found.best))
+    return _inverted(found)
+
+
+def _inverted(joint: Joint) -> Joint:
+    ties: tuple[Tie, ...] = tuple(turned_tie(tie) for tie in joint.ties)
+    return replace(joint, pose=inverse(joint.pose), ties=ties)
