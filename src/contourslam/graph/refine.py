@@ -16,7 +16,7 @@ from contourslam.matching.small import invert
 REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
 MOST_TIES = 3  # places a keyframe is held against
 APART = 3  # places before and after a keyframe's own that are not: their contours made its pose in the first place
-STILL = 0.01  # m that no keyframe moves farther than in a round after which no other is needed
+STILL = 0.1  # m that no keyframe moves farther than in a round after which no other is needed
 LEAST_OVERLAP = 0.6
 # What the solution so far is taken to know, and how far a tie may contradict it: m, m, rad.
 SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])

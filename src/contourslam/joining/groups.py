@@ -13,7 +13,7 @@ from contourslam.graph.refine import FARTHEST
 from contourslam.graph.regrown import regrow
 from contourslam.joining.building import Pair, keyframes_of
 from contourslam.joining.joint import Joint, Tie
-from contourslam.joining.shared import identify
+from contourslam.joining.shared import shared
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.small import moved, solve, turned
 
@@ -88,9 +88,11 @@ def find_groups(maps: Sequence[SavedMap], joints: Mapping[Pair, Joint]) -> tuple
     tree: dict[int, list[_Step]] = {number: [] for number in range(len(maps))}
     holding: list[Pair] = []
     left_out: list[LeftOut] = []
-    for pair, tie, pose in _shared(ways):
-        if not _path(tree, *pair):
-            _connect(tree, pair, tie, pose)
+    for (first, second), (one, other) in shared([way.keyframes for way in ways]).items():
+        if not _path(tree, first, second):
+            tie = Tie(int(one[0]), int(other[0]), np.zeros(3), EXACT, 1.0, 0.0)
+            mine, theirs = ways[first].keyframes.poses[tie.first], ways[second].keyframes.poses[tie.second]
+            _connect(tree, (first, second), tie, compose_one(mine, inverse(theirs)))
     for pair in sorted(joints, key=lambda pair: (-strength(joints[pair]), pair)):
         tie, path = surest(joints[pair]), _path(tree, *pair)
         if path:
@@ -137,20 +139,6 @@ class _Ways:
         assert self._doubt is not None
         covariance = self._doubt.between(nodes[second], np.array([nodes[first]]), poses[second])[0]
         return between_one(poses[first], poses[second]), turned(covariance, -poses[first, 2])
-
-
-def _shared(ways: Sequence[_Ways]) -> list[tuple[Pair, Tie, Floats]]:
-    """Pairs of maps that hold the same drive, with a keyframe that is in both and the second's frame in the first's."""
-    found = []
-    numbers = identify([way.keyframes for way in ways])
-    for second in range(len(ways)):
-        for first in range(second):
-            _, one, other = np.intersect1d(numbers[first], numbers[second], return_indices=True)
-            if len(one):
-                tie = Tie(int(one[0]), int(other[0]), np.zeros(3), EXACT, 1.0, 0.0)
-                mine, theirs = ways[first].keyframes.poses[tie.first], ways[second].keyframes.poses[tie.second]
-                found.append(((first, second), tie, compose_one(mine, inverse(theirs))))
-    return found
 
 
 def _connect(tree: dict[int, list[_Step]], pair: Pair, tie: Tie, pose: Floats) -> None:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -37,3 +38,14 @@ def identify(maps: Sequence[Contoured]) -> tuple[Ints, ...]:
             count = max(count, int(own[i]) + 1)
         numbers.append(own)
     return tuple(numbers)
+
+
+def shared(maps: Sequence[Contoured]) -> dict[tuple[int, int], tuple[Ints, Ints]]:
+    """Give the keyframes of all pairs of maps that hold the same drive: their numbers in the one and in the other."""
+    numbers = identify(maps)
+    found = {}
+    for first, second in combinations(range(len(maps)), 2):
+        _, one, other = np.intersect1d(numbers[first], numbers[second], return_indices=True)
+        if len(one):
+            found[first, second] = one, other
+    return found
