@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contourslam.contour.contours import Floats, Ints
 from contourslam.errors import MapError
 from contourslam.geometry.poses import between, compose, inverse, transform
-from contourslam.joining.overlay import Surfaces, surfaces_of
+from contourslam.joining.overlay import Surfaces, numbered, squares_of, surfaces_of
 from contourslam.localization.known_map import KnownMap
 from contourslam.localization.view import View, view_of
 from contourslam.maps.saved_map import Contoured, SavedMap
@@ -92,6 +92,14 @@ class Chart:
         return KnownMap(self.saved)
 
     @cached_property
+    def landmarks(self) -> Constellation:
+        """All its corners and walls."""
+        corners, walls = self.saved.corners, self.saved.walls
+        return Constellation(
+            corners.positions, corners.directions, corners.openings, corners.convex, walls.normals, walls.end_points
+        )
+
+    @cached_property
     def surfaces(self) -> Surfaces:
         """Its surfaces and where it is empty."""
         return surfaces_of(self.frames, np.arange(len(self.frames)), self.frames.poses)
@@ -115,11 +123,9 @@ class Chart:
         origins = np.repeat(poses[:, :2], [len(c) for c in contours], axis=0)
         near = np.isfinite(points).all(axis=1) & (np.hypot(points[:, 0], points[:, 1]) < SEEN_FROM)
         points, origins = points[near], origins[near]
-        octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5) % 8
-        keys = np.column_stack([np.floor(points[:, :2] / MERGED), octants])
-        first = np.sort(np.unique(keys, axis=0, return_index=True)[1])
+        first = np.sort(np.unique(squares_of(points, MERGED), return_index=True)[1])
         view = view_of(points[first], origins[first])
-        return StretchView(anchor, members, view, _among(self.known.landmarks, back, view.points))
+        return StretchView(anchor, members, view, _among(self.landmarks, back, view.points))
 
     @cached_property
     def _anchors(self) -> Ints:
@@ -180,12 +186,12 @@ def _stretches(frames: Contoured, way: Floats) -> tuple[Ints, ...]:
 def _among(known: Constellation, back: Floats, points: Floats) -> Constellation:
     """Landmarks near the points of a view, in its frame; `back` is the map seen from there."""
     corners, ends = transform(back, known.corners), transform(back, known.end_points)
-    squares = {(int(x), int(y)) for x, y in np.unique(np.floor(points[:, :2] / TOUCH), axis=0)}
+    seen = np.unique(numbered(np.floor(points[:, :2] / TOUCH)))
+    around = np.array([(dx, dy) for dx in (-1.0, 0.0, 1.0) for dy in (-1.0, 0.0, 1.0)])
 
     def touched(spots: Floats) -> NDArray[np.bool_]:
-        cells = np.floor(spots / TOUCH).astype(int)
-        near = [(int(x) + dx, int(y) + dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) for x, y in cells]
-        return np.asarray(np.array([spot in squares for spot in near], np.bool_).reshape(9, -1).any(axis=0))
+        near = numbered(np.floor(spots / TOUCH)[:, None] + around)
+        return np.asarray(np.isin(near, seen).any(axis=1))
 
     own = touched(corners)
     walls = touched(ends.mean(axis=1)) if len(ends) else np.empty(0, np.bool_)

@@ -69,7 +69,7 @@ def look(first: Chart, second: Chart, view: int) -> tuple[Look, ...]:
         return ()
     proposed: list[tuple[Floats, Method]] = []
     if 2 * len(seen.landmarks.corners) + len(seen.landmarks.normals) >= LEAST_LANDMARKS:
-        found = propose(seen.landmarks, known.landmarks, keep=KEPT_PROPOSALS)
+        found = propose(seen.landmarks, first.landmarks, keep=KEPT_PROPOSALS)
         proposed += [(proposal.pose, "constellation") for proposal in found]
     hypotheses, _ = search_everywhere(known.grid, known.standing, seen.view, keep=SEARCHED)
     proposed += [(hypothesis.pose, "search") for hypothesis in hypotheses]

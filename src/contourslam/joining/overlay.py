@@ -120,11 +120,20 @@ def surfaces_of(frames: Contoured, keyframes: Ints, poses: Floats) -> Surfaces:
     return Surfaces(np.ascontiguousarray(points[~clear.free[at[:, 1], at[:, 0]]]), cells, clear)
 
 
+def numbered(squares: Floats) -> Ints:
+    """One number for each square of a grid, given by two whole numbers in the last axis."""
+    return np.asarray(squares[..., 0].astype(np.int64) << 32 | squares[..., 1].astype(np.int64) & 0xFFFFFFFF)
+
+
+def squares_of(points: Floats, size: float) -> Ints:
+    """The square of the plane, of `size` (m), that each contour point lies in, and which of eight ways it looks."""
+    octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5).astype(np.int64) % 8
+    return numbered(np.floor(points[:, :2] / size)) * 8 + octants
+
+
 def _averaged(points: Floats) -> Floats:
     """One point for each square and direction."""
-    octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5) % 8
-    keys = np.column_stack([np.floor(points[:, :2] / SQUARE), octants]).astype(np.int64)
-    _, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    _, which, count = np.unique(squares_of(points, SQUARE), return_inverse=True, return_counts=True)
     sums = np.stack([np.bincount(which.reshape(-1), points[:, c], len(count)) for c in range(4)], axis=1)
     out = sums / count[:, None]
     out[:, 2:] /= np.maximum(np.hypot(out[:, 2], out[:, 3]), 1e-9)[:, None]

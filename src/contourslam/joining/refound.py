@@ -20,7 +20,7 @@ def refound(first: Chart, second: Chart, laid: Laid) -> tuple[int, int]:
     """Count the corners and the walls of the second map that lie on alike ones of the first."""
     if not laid.fits.any():
         return 0, 0
-    mine, theirs = second.known.landmarks, first.known.landmarks
+    mine, theirs = second.landmarks, first.landmarks
     spots, moved, near = _moved(second, laid, mine.corners, mine.directions)
     corners = 0
     for k in np.flatnonzero(near):
