@@ -162,7 +162,8 @@ def _cores() -> int:
 def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
     """Connect to a scheduler, or start one with workers in processes of this machine that nobody else can reach."""
     distributed = require("distributed")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what ends a sweep, it says itself
+    for name in ("distributed", "distributed.client", "distributed.core", "distributed.comm"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what ends a sweep, it says itself
     if scheduler is not None:
         try:
             client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)

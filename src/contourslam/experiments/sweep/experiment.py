@@ -187,9 +187,8 @@ def _setting(name: str, given: Any) -> dict[str, Any]:
     try:
         build(Config, given)
     except ConfigError as error:
-        named = re.search(r"(?:setting |^)([\w.]+)", str(error))
-        key = named.group(1) if named else ""
-        raise _WrongError(place, "", str(error)) if not key else _InSettingError(place, key, str(error)) from error
+        key = re.sub(r"^unknown setting ", "", str(error)).partition(" ")[0].rstrip(";")
+        raise _InSettingError(place, key, str(error)) from error
     return given
 
 

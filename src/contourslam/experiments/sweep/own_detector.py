@@ -75,10 +75,7 @@ def find_detector(name: str, place: str, folder: Path) -> OwnDetector:
         raise ConfigError(f"{path}: is not Python ({error})") from error
     if factory not in there:
         raise ConfigError(f"{path}: has no {factory}{perhaps(factory, there)}")
-    digest = hashlib.sha256(source).hexdigest()
-    return OwnDetector(
-        name, str(path.resolve()) + ":" + factory if is_file else place, digest, source if is_file else None
-    )
+    return OwnDetector(name, place, hashlib.sha256(source).hexdigest(), source if is_file else None)
 
 
 def load_detector(detector: OwnDetector) -> None:

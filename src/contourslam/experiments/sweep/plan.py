@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -14,7 +15,7 @@ from contourslam.experiments.sweep.files import identity, matching, relations_be
 from contourslam.experiments.sweep.own_detector import OwnDetector, find_detector
 from contourslam.experiments.sweep.runs import RecordedDrive, Run, SimulatedDrive
 from contourslam.settings_file import build
-from contourslam.simulation.config import LIDARS
+from contourslam.simulation.config import LIDARS, LidarModel
 
 
 def plan(experiment: Experiment) -> tuple[Run, ...]:
@@ -39,14 +40,16 @@ def plan(experiment: Experiment) -> tuple[Run, ...]:
     own = {name: _own(experiment, name, place) for name, place in experiment.own_detectors.items()}
     recorded = _recordings(experiment)
     runs: dict[str, Run] = {}
+    config = lru_cache(maxsize=None)(lambda lidar, setting: _config(lidar, experiment.settings[setting]))
     for grid in experiment.grids:
         drives: list[SimulatedDrive | RecordedDrive] = []
         drives += [drive for pattern in grid.recordings for drive in recorded[pattern]]
         drives += _simulated(grid)
         for drive in drives:
+            lidar = drive.model if isinstance(drive, SimulatedDrive) else None
             for setting, detector in itertools.product(grid.settings, grid.detectors):
-                config = _config(drive, experiment.settings[setting], detector)
-                run = Run(drive, detector, own.get(detector), setting, config)
+                chosen = replace(config(lidar, setting), detector=detector)
+                run = Run(drive, detector, own.get(detector), setting, chosen)
                 runs.setdefault(run.key, run)
     # A stable sort: what was written first is done first, but what shares a drive stands together.
     order = {drive: i for i, drive in enumerate(dict.fromkeys(run.drive.shared for run in runs.values()))}
@@ -100,10 +103,10 @@ def _simulated(grid: Grid) -> Iterator[SimulatedDrive]:
         yield SimulatedDrive(room, seed, name, noise, beams, duration, speed)
 
 
-def _config(drive: SimulatedDrive | RecordedDrive, overrides: dict[str, Any], detector: str) -> Config:
+def _config(lidar: LidarModel | None, overrides: dict[str, Any]) -> Config:
     """Defaults, what a simulated lidar's data sheet says, then what the setting says."""
-    base = Config() if isinstance(drive, RecordedDrive) else told(Config(), drive.model)
-    return replace(build(Config, _merged(asdict(base), overrides)), detector=detector)
+    base = Config() if lidar is None else told(Config(), lidar)
+    return build(Config, _merged(asdict(base), overrides))
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from contourslam.config import Config
@@ -118,17 +118,15 @@ class Run:
         """The complete configuration, ready for JSON; with the program's version it makes the key."""
         drive = asdict(self.drive)
         if isinstance(self.drive, SimulatedDrive):
-            drive["simulation"] = asdict(self.drive.simulation)
+            drive["simulation"] = _as_dict(self.drive.simulation)
         own = None if self.own is None else {"place": self.own.place, "digest": self.own.digest}
-        described = {
+        return {
             "drive": drive,
             "detector": self.detector,
             "own_detector": own,
             "setting": self.setting,
-            "config": asdict(self.config),
+            "config": _as_dict(self.config),
         }
-        cleaned: Described = _for_json(described)
-        return cleaned
 
     @cached_property
     def key(self) -> str:
@@ -169,6 +167,13 @@ class Run:
             beams = "" if drive.beams is None else f", {drive.beams} beams"
             place = f"{drive.room}, seed {drive.seed}{noise}{beams}"
         return f"{self.detector}, {self.setting}, {place}"
+
+
+@lru_cache(maxsize=4096)
+def _as_dict(values: Config | SimulationConfig) -> Described:
+    """As names and values, once for all runs that share it."""
+    cleaned: Described = _for_json(asdict(values))
+    return cleaned
 
 
 def _for_json(values: Any) -> Any:

@@ -247,7 +247,7 @@ def read_results(url: str, *, every: bool = False) -> Any:
     if every:
         return table
     place = {key: row for row, key in enumerate(table.column("key").to_pylist())}
-    return table.take([place[key] for key in keys if key in place])
+    return table.take(require("pyarrow").array([place[key] for key in keys if key in place], "int64"))
 
 
 def _part(key: str, status: str) -> str:
