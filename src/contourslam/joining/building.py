@@ -13,12 +13,15 @@ from contourslam.geometry.poses import compose
 from contourslam.graph.places import ROBUST_TIES
 from contourslam.joining.joint import Joint
 from contourslam.joining.shared import identify
-from contourslam.maps.saved_map import NOT_CONTINUABLE, Contoured, Relations, SavedMap, Seen, Stretches
+from contourslam.maps.saved_map import Contoured, Relations, SavedMap, Seen, Stretches
 from contourslam.matching.small import invert, turned
 
 Pair = tuple[int, int]
 """Two maps by their numbers; the second is seen from the first."""
 
+NOT_JOINABLE = (
+    "the map cannot be joined to others: it holds no keyframes, or not what binds them; map anew with --back-end graph"
+)
 # One tie of each joint stays whatever a refinement finds, so that no map ever hangs loose. It is held this much looser,
 # for the refinement ties the same keyframes anew, and nothing is to count twice.
 LOOSER = 10.0
@@ -110,7 +113,7 @@ def keyframes_of(saved: SavedMap) -> Contoured:
         If it does not hold what binds them.
     """
     if saved.keyframes is None or not saved.continuable:
-        raise MapError(NOT_CONTINUABLE)
+        raise MapError(NOT_JOINABLE)
     return saved.keyframes
 
 
@@ -121,7 +124,7 @@ def _parts(maps: Sequence[SavedMap], frames: Floats) -> list[_Part]:
     for saved, frame, keys in zip(maps, frames, known, strict=True):
         keyframes, relations, seen, stretches = saved.keyframes, saved.relations, saved.seen, saved.stretches
         if keyframes is None or relations is None or seen is None or stretches is None:
-            raise MapError(NOT_CONTINUABLE)
+            raise MapError(NOT_JOINABLE)
         fresh = keys >= count
         parts.append(_Part(keyframes, relations, seen, stretches, frame, keys, fresh))
         count += int(fresh.sum())

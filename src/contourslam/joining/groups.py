@@ -14,6 +14,7 @@ from contourslam.graph.regrown import regrow
 from contourslam.joining.building import Pair, keyframes_of
 from contourslam.joining.joint import Joint, Tie
 from contourslam.joining.shared import shared
+from contourslam.joining.ties import turned_tie
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.small import moved, solve, turned
 
@@ -144,12 +145,7 @@ class _Ways:
 def _connect(tree: dict[int, list[_Step]], pair: Pair, tie: Tie, pose: Floats) -> None:
     first, second = pair
     tree[first].append(_Step(pair, tie, pose))
-    # Seen from the other end: the same error, in the frame of the first's keyframe.
-    x, y, turn = tie.pose
-    c, s = np.cos(turn), np.sin(turn)
-    lever = np.array([[c, -s, y], [s, c, -x], [0.0, 0.0, 1.0]])
-    back = Tie(tie.second, tie.first, inverse(tie.pose), lever @ tie.covariance @ lever.T, tie.overlap, tie.residual)
-    tree[second].append(_Step((second, first), back, inverse(pose)))
+    tree[second].append(_Step((second, first), turned_tie(tie), inverse(pose)))
 
 
 def _path(tree: dict[int, list[_Step]], first: int, second: int) -> list[_Step]:
