@@ -55,6 +55,8 @@ def find_joint(first: Chart, second: Chart, *, observer: Observer | None = None)
     Joint or Apart
         That of the maps in the other order is its inverse.
     """
+    if _size(second) > _size(first):
+        return inverted(find_joint(second, first, observer=observer))
     looks: list[Look] = []
     count = len(first.stretches) + len(second.stretches)
     for done in range(count):
