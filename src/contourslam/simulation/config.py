@@ -1,7 +1,7 @@
 """Every setting of a simulated run; pure data, so that asking the command line for help loads nothing else."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,6 +166,13 @@ class SimulationConfig:
     """The lidar, by default the paper's."""
     robot: RobotModel = field(default_factory=RobotModel)
     """The robot's measures."""
+
+    @property
+    def measuring_lidar(self) -> LidarModel:
+        """The lidar with the noise that is asked for in place of its own."""
+        if self.noise is None:
+            return self.lidar
+        return replace(self.lidar, sigma_range=self.noise, sigma_relative=0.0)
 
     def __post_init__(self) -> None:
         if self.duration is not None and not 0.1 <= self.duration < math.inf:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +13,12 @@ from contourslam.robot.route import sample_route
 from contourslam.simulation.chance import DRIVER, stream
 from contourslam.simulation.config import RobotModel
 from contourslam.simulation.follower import Follower, Habits
-from contourslam.simulation.mjcf import import_mujoco
-from contourslam.simulation.robot import draw_flaws
+from contourslam.simulation.rolling import STEPS_PER_TICK, TICK, Moments, Rolling
 from contourslam.simulation.room import Room
-from contourslam.simulation.world import TIMESTEP, compile_world
+from contourslam.simulation.world import TIMESTEP
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
-STEPS_PER_TICK = 10  # physics steps per odometry reading and per decision of the driver
-TICK = STEPS_PER_TICK * TIMESTEP  # s: 50 Hz
-_SETTLING = 0.3  # s in which the robot sinks onto its wheels before the clock starts
 _LEAST_DURATION, _LEAST_LAPS = 180.0, 2.05
 _LONGEST_DURATION = 3600.0
 _PATIENCE = 10.0  # s without getting on along the route, after which the robot counts as stuck
@@ -36,7 +31,7 @@ class Drive:
     Attributes
     ----------
     times : ndarray, shape (n,)
-        s, ``TIMESTEP`` apart.
+        s, `spacing` apart.
     poses : ndarray, shape (n, 3)
         x (m), y (m), heading (rad) of the base in the world frame.
     positions : ndarray, shape (n, 3)
@@ -47,6 +42,10 @@ class Drive:
         How far the left and the right wheel have turned, rad.
     laps : float
         How many laps of the route were driven.
+    spacing : float
+        Between two rows, s.
+    first : int
+        How many rows there were before, in a part of a drive.
     """
 
     times: Floats
@@ -55,6 +54,18 @@ class Drive:
     rotations: Floats
     wheel_angles: Floats
     laps: float
+    spacing: float = TIMESTEP
+    first: int = 0
+
+    def between(self, times: Floats) -> tuple[NDArray[np.int64], Floats]:
+        """Row before each of some times (s), not the last row, and which part of the way to the next has passed."""
+        at = times / self.spacing
+        step = np.minimum(at.astype(np.int64), self.first + len(self.times) - 2)
+        return step - self.first, at - step
+
+    def row(self, time: float) -> int:
+        """Row nearest to a time (s)."""
+        return round(time / self.spacing) - self.first
 
     def truth(self, stamps: Floats) -> Floats:
         """True poses of the base (x, y, heading) at the given times (s), shape (m, 3)."""
@@ -96,28 +107,20 @@ def drive(
     ConfigError
         If the robot gets stuck: the route leads through something.
     """
-    mujoco = import_mujoco()
-    model = compile_world(room, robot, draw_flaws(seed))
-    data = mujoco.MjData(model)
-    follower = _take_place(room, data, speed, stream(seed, DRIVER))
-    mujoco.mj_step(model, data, round(_SETTLING / TIMESTEP))
-    data.qpos[7:9] = 0.0  # from here on the encoders count
-    states = [data.qpos.copy()]
-    laps, advanced = 0.0, 0.0
+    follower, start = take_place(sample_route(room.route), 0, speed, stream(seed, DRIVER))
+    world = Rolling(room, robot, [seed], [start])
+    moments = [world.begun]
+    laps, advanced, ticks = 0.0, 0.0, 0
     end = _LONGEST_DURATION if duration is None else duration
-    while (time := len(states) * TIMESTEP) < end + TIMESTEP / 2:
+    while (time := (1 + ticks * STEPS_PER_TICK) * TIMESTEP) < end + TIMESTEP / 2:
         if duration is None and time > _LEAST_DURATION and follower.laps >= _LEAST_LAPS:
             break
-        v, omega = follower.steer(_pose_now(states[-1]), time, TICK)
-        half_turn = 0.5 * omega * robot.wheel_base
-        data.ctrl[:] = (v - half_turn) / robot.wheel_radius, (v + half_turn) / robot.wheel_radius
-        for _ in range(STEPS_PER_TICK):
-            mujoco.mj_step(model, data)
-            states.append(data.qpos.copy())
+        moments.append(world.step([follower.steer(moments[-1].last_pose(0), time, TICK)]))
+        ticks += 1
         if follower.laps > laps:
             laps, advanced = follower.laps, time
         elif time - advanced > _PATIENCE:
-            x, y, _ = _pose_now(states[-1])
+            x, y, _ = moments[-1].poses[-1, 0]
             raise ConfigError(
                 f"room {room.name}: the robot got stuck at ({x:.2f}, {y:.2f}) m after {advanced:.0f} s; "
                 f"let the route keep clear of walls and pieces"
@@ -125,39 +128,59 @@ def drive(
         if progress is not None:
             done = min(time / _LEAST_DURATION, follower.laps / _LEAST_LAPS) if duration is None else time / end
             progress(min(done, 1.0))
-    qpos: Floats = np.array(states, dtype=np.float64)
-    rotations = _rotations(qpos)
-    heading = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0])
-    poses = np.stack([qpos[:, 0], qpos[:, 1], heading], axis=1)
-    times = TIMESTEP * np.arange(len(qpos), dtype=np.float64)
-    return Drive(times, poses, qpos[:, :3], rotations, qpos[:, 7:9], follower.laps)
+    return drive_of(Moments.joined(moments), 0, laps=follower.laps)
 
 
-def _take_place(room: Room, data: Any, speed: float, chance: np.random.Generator) -> Follower:
-    """Put the robot on the route, a little off its start, and give it a driver."""
-    route = sample_route(room.route)
-    first = int(chance.integers(0, 40))
+def drive_of(moments: Moments, robot: int, *, spacing: float = TIMESTEP, first: int = 0, laps: float = 0.0) -> Drive:
+    """What happened to one of several robots.
+
+    Parameters
+    ----------
+    moments : Moments
+    robot : int
+        Counted from 0.
+    spacing : float
+        Between two moments, s.
+    first : int
+        How many moments there were before.
+    laps : float
+
+    Returns
+    -------
+    Drive
+    """
+    times = spacing * np.arange(first, first + len(moments.poses), dtype=np.float64)
+    return Drive(
+        times, moments.poses[:, robot], moments.positions[:, robot], moments.rotations[:, robot],
+        moments.wheel_angles[:, robot], laps, spacing, first,
+    )  # fmt: skip
+
+
+def take_place(
+    route: Floats, first: int, speed: float, chance: np.random.Generator
+) -> tuple[Follower, tuple[float, float, float]]:
+    """Give a robot a driver and a place on its route, up to 0.4 m ahead of a point of it and a little beside it.
+
+    Parameters
+    ----------
+    route : ndarray, shape (n, 2)
+        From :func:`contourslam.robot.route.sample_route`.
+    first : int
+        Index of the point.
+    speed : float
+        Cruising speed, m/s.
+    chance : numpy.random.Generator
+
+    Returns
+    -------
+    driver : Follower
+    pose : tuple of float
+        Of the base: x (m), y (m), heading (rad).
+    """
+    first += int(chance.integers(0, 40))
     along = route[(first + 5) % len(route)] - route[first]
     heading = math.atan2(along[1], along[0]) + chance.uniform(-0.05, 0.05)
     sideways = chance.uniform(-0.03, 0.03)
-    x, y = route[first] + sideways * np.array([-math.sin(heading), math.cos(heading)])
-    data.qpos[:2] = x, y
-    data.qpos[3:7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
+    x, y = (route[first] + sideways * np.array([-math.sin(heading), math.cos(heading)])).tolist()
     habits = Habits(speed, chance.uniform(0.05, 0.15), chance.uniform(15.0, 30.0), chance.uniform(0.0, 2 * math.pi))
-    return Follower(route, habits, first)
-
-
-def _pose_now(qpos: Floats) -> tuple[float, float, float]:
-    x, y, _, qw, qx, qy, qz = qpos[:7].tolist()
-    return x, y, math.atan2(2 * (qx * qy + qw * qz), 1 - 2 * (qy * qy + qz * qz))
-
-
-def _rotations(qpos: Floats) -> Floats:
-    """Rotation matrices of the free joint's quaternions (w, x, y, z), shape (n, 3, 3)."""
-    w, x, y, z = qpos[:, 3:7].T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return Follower(route, habits, first), (x, y, heading)

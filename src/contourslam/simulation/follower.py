@@ -54,14 +54,21 @@ class Follower:
         """How many laps have been driven since the start."""
         return (self._index - self._first) / len(self._route)
 
-    def steer(self, pose: tuple[float, float, float], time: float, dt: float) -> tuple[float, float]:
-        """Forward speed (m/s) and turning speed (rad/s) wanted at a true pose (x, y, heading) and a time (s)."""
+    @property
+    def index(self) -> int:
+        """Of the point of the route where the robot is, counted on from lap to lap."""
+        return self._index
+
+    def steer(
+        self, pose: tuple[float, float, float], time: float, dt: float, most: float = math.inf
+    ) -> tuple[float, float]:
+        """Forward speed (m/s), at the most so much, and turning speed (rad/s) wanted at a true pose and a time (s)."""
         habits, count = self._habits, len(self._route)
         x, y, _ = pose
         ahead = self._route[(self._index + np.arange(_WINDOW)) % count]
         self._index += int(np.argmin((ahead[:, 0] - x) ** 2 + (ahead[:, 1] - y) ** 2))
         target = self._route[(self._index + round(habits.look_ahead / self._spacing)) % count]
-        cruise = habits.cruise(time)
+        cruise = min(habits.cruise(time), most)
         v, omega = wanted_twist(pose, (float(target[0]), float(target[1])), cruise, habits.turn_limit)
         self._v, self._omega = gently(self._v, v, ACCELERATION * dt), gently(self._omega, omega, TURN_ACCELERATION * dt)
         return self._v, self._omega

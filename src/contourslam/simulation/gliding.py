@@ -1,14 +1,18 @@
 """Driving without physics: a unicycle that glides along waypoints; nothing touches or tips; cheap for any length."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.geometry.poses import compose_one
+from contourslam.geometry.poses import compose, compose_one
 from contourslam.robot.route import gently, wanted_twist
+from contourslam.simulation.chance import FLAWS, stream
+from contourslam.simulation.config import RobotModel
 from contourslam.simulation.follower import ACCELERATION, TURN_ACCELERATION, Habits
+from contourslam.simulation.rolling import TICK as ROLLING_TICK
+from contourslam.simulation.rolling import Moments
 
 Floats = NDArray[np.float64]
 TICK = 0.05  # s: 20 Hz
@@ -16,6 +20,8 @@ _SPACING = 0.02  # m
 _WINDOW = 40  # points of the way ahead among which the robot is looked for
 _BRAKING = 45  # points: how far ahead a bend is seen in time to slow down for it
 _SLOW = 0.4  # m/s before a bend
+SLIP = 0.002
+"""Standard deviation of a wheel's way after one metre, m; it grows with the root of the way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,3 +112,43 @@ class _Route:
                 parts = np.arange(1, count + 1)[:, None] / count
                 self._points = np.concatenate([self._points[self._index :], self._last + parts * step])
                 self._index, self._last = 0, np.array(following)
+
+
+class Gliding:
+    """Several robots without physics: each goes exactly as told, on wheels that slip a little. Mutable.
+
+    Takes the place of :class:`~contourslam.simulation.rolling.Rolling`, with one moment a tick.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    seeds : sequence of int
+        Of each robot's slip.
+    starts : sequence of (x, y, heading)
+        m, m, rad.
+    """
+
+    spacing = ROLLING_TICK
+
+    def __init__(self, robot: RobotModel, seeds: Sequence[int], starts: Sequence[tuple[float, float, float]]) -> None:
+        self._robot, self._chances = robot, [stream(seed, FLAWS) for seed in seeds]
+        self._poses, self._turned = np.array(starts, dtype=np.float64), np.zeros((len(starts), 2))
+        self.begun = self._moment()
+
+    def step(self, twists: Sequence[tuple[float, float]]) -> Moments:
+        """Move on by a tick, 20 ms, along arcs of circles; returns the moment at its end."""
+        advance, turn = np.array(twists, dtype=np.float64).T * ROLLING_TICK
+        chord = advance * np.sinc(turn / (2 * np.pi))
+        arcs = np.stack([chord * np.cos(turn / 2), chord * np.sin(turn / 2), turn], axis=1)
+        self._poses = compose(self._poses, arcs)
+        rolled = advance[:, None] + turn[:, None] * self._robot.wheel_base / 2 * np.array([-1.0, 1.0])
+        luck = np.array([chance.standard_normal(2) for chance in self._chances])
+        self._turned = self._turned + (rolled + SLIP * np.sqrt(np.abs(rolled)) * luck) / self._robot.wheel_radius
+        return self._moment()
+
+    def _moment(self) -> Moments:
+        x, y, heading = self._poses.T
+        cos, sin, zero, one = np.cos(heading), np.sin(heading), np.zeros(len(x)), np.ones(len(x))
+        axes = np.moveaxis(np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]), 2, 0)
+        positions = np.stack([x, y, np.full(len(x), self._robot.wheel_radius)], axis=1)
+        return Moments(self._poses[None], positions[None], axes[None], self._turned[None])

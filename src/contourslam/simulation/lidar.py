@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,17 +64,14 @@ def cast_scans(
     MissingExtraError
         If MuJoCo is not installed.
     """
-    mujoco = import_mujoco()
-    model = compile_world(room)  # without the robot: the lidar stands above it and never sees it
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    end = drive.times[-1]
+    caster = SolidCaster(room)
+    end, mount_z = drive.times[-1], lidar.mount_height - float(drive.positions[0, 2])
     scans: list[IdealScan] = []
     for stamp, offsets, angles in turns(lidar, seed):
         if stamp + offsets[-1] > end:
             break
-        origins, directions = _beams(drive, lidar, stamp + offsets, angles)
-        ranges, incidences = cast_rays(mujoco, model, data, origins, directions)
+        origins, directions = beams(drive, lidar, mount_z, stamp + offsets, angles)
+        ranges, incidences = caster.cast(origins, directions)
         scans.append(IdealScan(stamp, angles, offsets, ranges, incidences))
         if progress is not None:
             progress(min(stamp / end, 1.0))
@@ -111,36 +107,62 @@ def turns(lidar: LidarModel, seed: int) -> Iterator[tuple[float, Floats, Floats]
         first += beams
 
 
-def _beams(drive: Drive, lidar: LidarModel, times: Floats, angles: Floats) -> tuple[Floats, Floats]:
-    """Origin (m) and unit direction of each beam in the world frame, each shape (n, 3), between physics steps."""
-    spacing = drive.times[1] - drive.times[0]
-    index = np.minimum((times / spacing).astype(np.int64), len(drive.times) - 2)
-    weight = (times / spacing - index)[:, None]
-    position = (1 - weight) * drive.positions[index] + weight * drive.positions[index + 1]
-    axes = (1 - weight[:, None]) * drive.rotations[index] + weight[:, None] * drive.rotations[index + 1]
-    mount = np.array([lidar.mount_x, 0.0, lidar.mount_height - drive.positions[0, 2]])
-    directions = np.cos(angles)[:, None] * axes[:, :, 0] + np.sin(angles)[:, None] * axes[:, :, 1]
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return position + axes @ mount, directions
-
-
-def cast_rays(mujoco: Any, model: Any, data: Any, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """Range (m; inf where it meets nothing) and incidence (rad) of rays in a compiled world.
+def beams(drive: Drive, lidar: LidarModel, mount_z: float, times: Floats, angles: Floats) -> tuple[Floats, Floats]:
+    """Origin (m) and unit direction of each beam in the world frame, each shape (n, 3), between physics steps.
 
     Parameters
     ----------
-    mujoco : module
-    model, data : MjModel, MjData
-    origins, directions : ndarray, shape (n, 3)
-        World frame, m; directions of unit length.
+    drive : Drive
+        Or a part of it with the times in it.
+    lidar : LidarModel
+    mount_z : float
+        Height of the lidar above the axle, m.
+    times, angles : ndarray, shape (n,)
+        s; rad in the lidar's frame.
     """
-    # One call a beam: casting many at once (mj_multiRay) would make all of them start at one point.
-    ray, count = mujoco.mj_ray, len(origins)
-    normals = np.zeros((count, 3))
-    found = [
-        ray(model, data, origin, direction, None, 1, -1, None, normal)
-        for origin, direction, normal in zip(origins, directions, normals, strict=True)
-    ]
-    ranges = np.array(found)
-    incidences = np.arcsin(np.clip(np.abs(np.einsum("ij,ij->i", normals, directions)), 0.0, 1.0))
-    return np.where(ranges < 0, np.inf, ranges), incidences
+    index, part = drive.between(times)
+    weight = part[:, None]
+    position = (1 - weight) * drive.positions[index] + weight * drive.positions[index + 1]
+    axes = (1 - weight[:, None]) * drive.rotations[index] + weight[:, None] * drive.rotations[index + 1]
+    directions = np.cos(angles)[:, None] * axes[:, :, 0] + np.sin(angles)[:, None] * axes[:, :, 1]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    # The last digits of a product depend on how its factors lie in memory: make them lie the same for any drive.
+    return position + np.ascontiguousarray(axes) @ np.array([lidar.mount_x, 0.0, mount_z]), directions
+
+
+class SolidCaster:
+    """Casts rays in a room in space, in MuJoCo: without a robot, whose own lidar stands above it and never sees it.
+
+    Parameters
+    ----------
+    room : Room
+
+    Raises
+    ------
+    MissingExtraError
+        If MuJoCo is not installed.
+    """
+
+    def __init__(self, room: Room) -> None:
+        mujoco = import_mujoco()
+        self._ray, self._model = mujoco.mj_ray, compile_world(room)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+
+    def cast(self, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
+        """Range (m; inf where it meets nothing) and incidence (rad) of rays.
+
+        Parameters
+        ----------
+        origins, directions : ndarray, shape (n, 3)
+            World frame, m; directions of unit length.
+        """
+        # One call a beam: casting many at once (mj_multiRay) would make all of them start at one point.
+        normals = np.zeros((len(origins), 3))
+        found = [
+            self._ray(self._model, self._data, origin, direction, None, 1, -1, None, normal)
+            for origin, direction, normal in zip(origins, directions, normals, strict=True)
+        ]
+        ranges = np.array(found)
+        incidences = np.arcsin(np.clip(np.abs(np.einsum("ij,ij->i", normals, directions)), 0.0, 1.0))
+        return np.where(ranges < 0, np.inf, ranges), incidences

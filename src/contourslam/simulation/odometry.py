@@ -1,6 +1,7 @@
 """Wheel odometry: encoders that count in ticks, and a robot that is a little wrong about its own wheels."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from contourslam.geometry.motion import unicycle_step
 from contourslam.geometry.poses import between
 from contourslam.simulation.chance import ODOMETRY, stream
 from contourslam.simulation.config import RobotModel
-from contourslam.simulation.drive import STEPS_PER_TICK, TICK, Drive
+from contourslam.simulation.drive import Drive
+from contourslam.simulation.rolling import STEPS_PER_TICK, TICK
 
 Floats = NDArray[np.float64]
 
@@ -56,20 +58,50 @@ def read_odometry(
     -------
     WheelOdometry
     """
-    chance = stream(seed, ODOMETRY)
-    radius_error, base_error = chance.choice([-1.0, 1.0], 2) * chance.uniform(0.005, 0.015, 2)
-    if errors is not None:
-        radius_error, base_error = errors
-    radius, base = robot.wheel_radius * (1 + radius_error), robot.wheel_base * (1 + base_error)
-
-    turns = drive.wheel_angles[::STEPS_PER_TICK] / (2 * math.pi)
-    ticks = np.floor(turns * robot.ticks_per_turn).astype(np.int64)
-    rolled = np.diff(ticks, axis=0) * (2 * math.pi / robot.ticks_per_turn * radius)
-    poses = [np.zeros(3)]
-    for left, right in rolled.tolist():
-        poses.append(unicycle_step(poses[-1], (left + right) / 2 / TICK, (right - left) / base / TICK, TICK))
+    encoders = Encoders(robot, seed, errors=errors)
+    poses, ticks = zip(
+        *(encoders.read(angles) for angles in drive.wheel_angles[::STEPS_PER_TICK].tolist()), strict=True
+    )
     stamps = np.round(drive.times[::STEPS_PER_TICK], 9)
-    return WheelOdometry(stamps, np.array(poses), ticks, float(radius_error), float(base_error))
+    return WheelOdometry(stamps, np.array(poses), np.array(ticks), encoders.radius_error, encoders.base_error)
+
+
+class Encoders:
+    """The encoders of a robot, and what it makes of them, reading by reading. Mutable.
+
+    Parameters
+    ----------
+    robot, seed, errors
+        As :func:`read_odometry` takes them.
+
+    Attributes
+    ----------
+    radius_error, base_error : float
+        As of :class:`WheelOdometry`.
+    """
+
+    def __init__(self, robot: RobotModel, seed: int, *, errors: tuple[float, float] | None = None) -> None:
+        chance = stream(seed, ODOMETRY)
+        drawn = chance.choice([-1.0, 1.0], 2) * chance.uniform(0.005, 0.015, 2)
+        wrong: tuple[float, float] = tuple(drawn.tolist()) if errors is None else errors
+        self.radius_error, self.base_error = wrong
+        self._base = robot.wheel_base * (1 + self.base_error)
+        self._per_turn = robot.ticks_per_turn
+        self._way = 2 * math.pi / robot.ticks_per_turn * (robot.wheel_radius * (1 + self.radius_error))  # m per tick
+        self._pose = np.zeros(3)
+        self._ticks: tuple[int, int] | None = None
+
+    def read(self, angles: Sequence[float]) -> tuple[Floats, tuple[int, int]]:
+        """Pose in the frame of the first reading, shape (3,), and counts, at angles of left and right wheel, rad."""
+        now = (self._count(angles[0]), self._count(angles[1]))
+        if self._ticks is not None:
+            left, right = ((now[side] - self._ticks[side]) * self._way for side in (0, 1))
+            self._pose = unicycle_step(self._pose, (left + right) / 2 / TICK, (right - left) / self._base / TICK, TICK)
+        self._ticks = now
+        return self._pose, now
+
+    def _count(self, angle: float) -> int:
+        return math.floor(angle / (2 * math.pi) * self._per_turn)
 
 
 def effective_wheels(drive: Drive) -> tuple[float, float, float]:

@@ -1,6 +1,6 @@
 """The rooms that come with the package; one more is one more description."""
 
-from contourslam.simulation.buildings import office_building
+from contourslam.simulation.buildings import Building, office_building
 from contourslam.simulation.pieces import (
     CARTON,
     DARK_WOOD,
@@ -155,7 +155,11 @@ LARGE_HALL = Room(
     wall_height=5.0,
 )
 
-OFFICE_BUILDING = office_building(corridors=2, seed=4).room  # `long_drive` has larger ones
+_OFFICE = office_building(corridors=2, seed=4)  # `long_drive` has larger ones
+OFFICE_BUILDING = _OFFICE.room
 
 ROOMS: dict[str, Room] = {room.name: room for room in (FURNISHED_ROOM, OFFICE_CORRIDOR, LARGE_HALL, OFFICE_BUILDING)}
 """Name to room: those that the command line offers."""
+
+BUILDINGS: dict[str, Building] = {OFFICE_BUILDING.name: _OFFICE}
+"""Those of them that are buildings, whose corridors and doors are known, by name."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from contourslam.simulation.config import RobotModel
 from contourslam.simulation.mjcf import add, import_mujoco
 from contourslam.simulation.pieces import Cylinder
-from contourslam.simulation.robot import add_robot, draw_flaws
+from contourslam.simulation.robot import Standing, add_robot, draw_flaws
 from contourslam.simulation.textures import RoomTextures, Surface
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ def compile_textured_world(textures: RoomTextures, robot: RobotModel, T_base_cam
     mujoco = import_mujoco()
     root = ElementTree.Element("mujoco", model=textures.room.name)
     world = add(root, "worldbody")
-    add_robot(root, world, robot, draw_flaws(0), textures.room.start)
+    add_robot(root, world, Standing(robot, draw_flaws(0), textures.room.start))
     body = world[0]
     _add_mast(body, T_base_camera, robot.wheel_radius)
     spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))

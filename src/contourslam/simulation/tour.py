@@ -26,7 +26,9 @@ class Leg:
     fresh: bool
 
 
-def tour(building: Building, seed: int) -> Iterator[Leg]:
+def tour(
+    building: Building, seed: int, *, start: Junction = (0, 0), lanes: tuple[float, float] = (-_LANE, _LANE)
+) -> Iterator[Leg]:
     """Drive through a building without end; memory does not grow with the way.
 
     Exploring takes the nearest corridor not driven yet; coming back goes to a place drawn from those seen. The two
@@ -37,12 +39,16 @@ def tour(building: Building, seed: int) -> Iterator[Leg]:
     building : Building
     seed : int
         Varies the order, the side of the corridor and the rooms that are visited.
+    start : tuple of int
+        The junction where it begins.
+    lanes : tuple of float
+        Between which a stretch is driven, m to the left of the middle of the corridor.
 
     Yields
     ------
     Leg
     """
-    tourist = _Tourist(building, stream(seed, DRIVER))
+    tourist = _Tourist(building, stream(seed, DRIVER), start, lanes)
     while True:
         yield from tourist.explore()
         yield from tourist.come_back()
@@ -51,13 +57,15 @@ def tour(building: Building, seed: int) -> Iterator[Leg]:
 class _Tourist:
     """Remembers where it is and what it has seen. Mutable."""
 
-    def __init__(self, building: Building, chance: np.random.Generator) -> None:
-        self._building, self._chance = building, chance
+    def __init__(
+        self, building: Building, chance: np.random.Generator, start: Junction, lanes: tuple[float, float]
+    ) -> None:
+        self._building, self._chance, self._lanes = building, chance, lanes
         self._ways: dict[Junction, list[Junction]] = {junction: [] for junction in building.junctions}
         for a, b in building.stretches:
             self._ways[a].append(b)
             self._ways[b].append(a)
-        self._here: Junction = (0, 0)
+        self._here = start
         self._from: Junction | None = None
         self._seen: set[Stretch] = set()
         self._entered: set[Doorway] = set()
@@ -110,7 +118,7 @@ class _Tourist:
             stretch = (min(a, b), max(a, b))
             ends = self._building.junctions[a], self._building.junctions[b]
             doorways = self._choose(stretch, *ends)
-            lane, turn = float(self._chance.uniform(-_LANE, _LANE)), int(self._chance.choice([-1, 1]))
+            lane, turn = float(self._chance.uniform(*self._lanes)), int(self._chance.choice([-1, 1]))
             fresh = stretch not in self._seen
             for index, points in enumerate(passage(*ends, lane, doorways, turn)):
                 visiting = index % 2 == 1

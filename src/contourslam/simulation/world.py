@@ -1,13 +1,13 @@
-"""A room, and if wanted the robot in it, as a MuJoCo model."""
+"""A room, and if wanted the robots in it, as a MuJoCo model."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
-from contourslam.simulation.config import RobotModel
 from contourslam.simulation.mjcf import Element, add, import_mujoco
 from contourslam.simulation.pieces import Box, Colour
-from contourslam.simulation.robot import Flaws, add_robot
+from contourslam.simulation.robot import Standing, add_robot
 from contourslam.simulation.room import Room
 
 TIMESTEP = 0.002  # s
@@ -15,7 +15,7 @@ _WALL = 0.12  # m, thickness
 _WALL_COLOUR: Colour = (0.86, 0.84, 0.79)
 
 
-def compile_world(room: Room, robot: RobotModel | None = None, flaws: Flaws | None = None) -> Any:
+def compile_world(room: Room, robots: Sequence[Standing] = ()) -> Any:
     """Compile the MuJoCo model (``mujoco.MjModel``) of a room; parameters as :func:`world_xml`.
 
     Raises
@@ -23,19 +23,17 @@ def compile_world(room: Room, robot: RobotModel | None = None, flaws: Flaws | No
     MissingExtraError
         If MuJoCo is not installed.
     """
-    return import_mujoco().MjModel.from_xml_string(world_xml(room, robot, flaws))
+    return import_mujoco().MjModel.from_xml_string(world_xml(room, robots))
 
 
-def world_xml(room: Room, robot: RobotModel | None = None, flaws: Flaws | None = None) -> str:
-    """Describe a room in MuJoCo's XML: floor, walls and pieces, all fixed, and the robot where one is given.
+def world_xml(room: Room, robots: Sequence[Standing] = ()) -> str:
+    """Describe a room in MuJoCo's XML: floor, walls and pieces, all fixed, and the robots that stand in it.
 
     Parameters
     ----------
     room : Room
-    robot : RobotModel, optional
-        Stands at the room's start.
-    flaws : Flaws, optional
-        Needed with a robot.
+    robots : sequence of Standing
+        Their parts are named ``base``, ``left``, ``right``; where there are several, ``robot1_base`` and so on.
 
     Returns
     -------
@@ -48,8 +46,8 @@ def world_xml(room: Room, robot: RobotModel | None = None, flaws: Flaws | None =
     _add_looks(root)
     world = add(root, "worldbody")
     _add_room(world, room)
-    if robot is not None and flaws is not None:
-        add_robot(root, world, robot, flaws, room.start)
+    for number, standing in enumerate(robots, 1):
+        add_robot(root, world, standing, f"robot{number}_" if len(robots) > 1 else "")
     return ElementTree.tostring(root, encoding="unicode")
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contourslam.simulation.config import RobotModel
 from contourslam.simulation.mjcf import import_mujoco
-from contourslam.simulation.robot import draw_flaws
+from contourslam.simulation.robot import Standing, draw_flaws
 from contourslam.simulation.room import Room
 from contourslam.simulation.world import TIMESTEP, compile_world
 
@@ -77,7 +77,7 @@ class Body:
 
     def __init__(self, room: Room, robot: RobotModel, motor: Motor, seed: int) -> None:
         self._mujoco = import_mujoco()
-        self._model = compile_world(room, robot, draw_flaws(seed))
+        self._model = compile_world(room, [Standing(robot, draw_flaws(seed), room.start)])
         # A velocity servo of this gain, told the speed at which the duty's voltage is used up, is a DC motor.
         gain = motor.stall / motor.no_load
         self._model.actuator_gainprm[:, 0], self._model.actuator_biasprm[:, 2] = gain, -gain

@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 
 from contourslam.simulation.config import LidarModel
 from contourslam.simulation.hardware.body import Body, Moment
-from contourslam.simulation.lidar import IdealScan, cast_rays, turns
-from contourslam.simulation.mjcf import import_mujoco
+from contourslam.simulation.lidar import IdealScan, SolidCaster, turns
 from contourslam.simulation.noise import measure
 from contourslam.simulation.room import Room
-from contourslam.simulation.world import compile_world
 
 Floats = NDArray[np.float64]
 LASER_ASIDE, LASER_TILT = 0.0218, 0.0218 / 0.1553
@@ -33,10 +31,7 @@ class Sight:
     """
 
     def __init__(self, room: Room, lidar: LidarModel, body: Body, seed: int) -> None:
-        self._mujoco = import_mujoco()
-        self._model = compile_world(room)  # without the robot: the lidar stands above it and never sees it
-        self._data = self._mujoco.MjData(self._model)
-        self._mujoco.mj_kinematics(self._model, self._data)
+        self._caster = SolidCaster(room)
         self._lidar, self._body, self._seed = lidar, body, seed
         self._chance = np.random.default_rng([seed, 103])
         self._mount = np.array([lidar.mount_x, 0.0, lidar.mount_height - body.now.position[2]])
@@ -60,7 +55,7 @@ class Sight:
         rays = ahead - LASER_TILT * right
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         begins = places + axes @ self._mount + LASER_ASIDE * right
-        lengths, incidences = cast_rays(self._mujoco, self._model, self._data, begins, rays)
+        lengths, incidences = self._caster.cast(begins, rays)
         hit = np.isfinite(lengths)
         found = LASER_ASIDE * right + np.where(hit, lengths, 0.0)[:, None] * rays
         return np.where(hit, np.linalg.norm(found, axis=1), np.inf), incidences
