@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.detectors import DETECTORS, make_detector
+from contourslam.detectors import DETECTORS, Detector, make_detector
 from contourslam.evaluation.detection import DetectedCorners, DetectionScore, score_detections
 from contourslam.evaluation.metrics import Metrics
 from contourslam.evaluation.visibility import VisibilityLimits
@@ -74,7 +74,9 @@ def refinement(
     return Refinement(raw, refined, scores, complete)
 
 
-def corner_score(run: SimulatedRun, config: Config, *, every: int = 1) -> DetectionScore:
+def corner_score(
+    run: SimulatedRun, config: Config, detector: Detector | None = None, *, every: int = 1
+) -> DetectionScore:
     """Hold the corners of a run's scans against the true corners of its room.
 
     The motion during a scan is undone with the true one, so that the score is the detector's alone.
@@ -83,6 +85,8 @@ def corner_score(run: SimulatedRun, config: Config, *, every: int = 1) -> Detect
     ----------
     run : SimulatedRun
     config : Config
+    detector : Detector, optional
+        One of one's own in place of the configuration's.
     every : int
         Only every so many scans are looked at.
 
@@ -90,7 +94,7 @@ def corner_score(run: SimulatedRun, config: Config, *, every: int = 1) -> Detect
     -------
     DetectionScore
     """
-    detector = make_detector(config.detector, adapted=config.adapted)
+    detector = detector or make_detector(config.detector, adapted=config.adapted)
     mount = run.lidar_mount
     scans = run.scans[::every]
     found = []

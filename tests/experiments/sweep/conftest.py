@@ -32,3 +32,15 @@ def written(tmp_path: Path) -> Written:
 def planned(written: Written) -> Planned:
     """Runs of an experiment."""
     return lambda text: plan(written(text))
+
+
+@pytest.fixture
+def log_of(tmp_path, scan_of, room):
+    """Writes still.log, a CARMEN log of a robot that stands still in a room of 6 by 4 m, 25 scans."""
+
+    def write(end: str = "") -> None:
+        ranges = " ".join(f"{r:.2f}" for r in scan_of(room([[-3, -2], [3, -2], [3, 2], [-3, 2]]), beams=180).ranges)
+        lines = [f"FLASER 180 {ranges} 0 0 0 0 0 0 {t / 10:.2f} robot {t / 10:.2f}\n" for t in range(25)]
+        (tmp_path / "still.log").write_text("".join(lines) + end)
+
+    return write

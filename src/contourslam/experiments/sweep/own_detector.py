@@ -78,12 +78,18 @@ def find_detector(name: str, place: str, folder: Path) -> OwnDetector:
     return OwnDetector(name, place, hashlib.sha256(source).hexdigest(), source if is_file else None)
 
 
-def load_detector(detector: OwnDetector) -> None:
-    """Import a detector's file or module and enter what makes it into the registry under its name.
+def load_detector(detector: OwnDetector, *, adapted: bool) -> Detector:
+    """Import a detector's file or module, once a process, and make the detector.
 
     Parameters
     ----------
     detector : OwnDetector
+    adapted : bool
+        What its factory is called with.
+
+    Returns
+    -------
+    Detector
 
     Raises
     ------
@@ -111,7 +117,7 @@ def load_detector(detector: OwnDetector) -> None:
                 del sys.modules[title]
                 raise
         module = sys.modules[title]
-    DETECTORS[detector.name] = cast(Factory, getattr(module, factory))
+    return cast(Factory, getattr(module, factory))(adapted)
 
 
 class _Shipped(importlib.abc.SourceLoader):

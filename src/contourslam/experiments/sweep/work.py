@@ -1,7 +1,7 @@
 """One run of a sweep: the drive, the replay, and every figure about it. What runs have in common is done once."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
 
@@ -48,6 +48,8 @@ class Material:
     simulated : SimulatedRun or None
     damage : RecordingError or None
         With which the recording breaks off.
+    skipped : dict of str to int
+        Messages that could not be used: the reason, and how many.
     """
 
     messages: tuple[Message, ...]
@@ -55,6 +57,7 @@ class Material:
     relations: tuple[Floats, Floats] | None = None
     simulated: SimulatedRun | None = None
     damage: RecordingError | None = None
+    skipped: dict[str, int] = field(default_factory=dict)
 
     def play(self) -> Iterator[Message]:
         """Yield the messages, and fail where the recording does."""
@@ -81,14 +84,15 @@ def measure(run: Run) -> Metrics:
     ContourslamError
         If the recording cannot be read at all, a library is missing, or the configuration is refused.
     """
-    if run.own is not None:
-        load_detector(run.own)
+    detector = None if run.own is None else load_detector(run.own, adapted=run.config.adapted)
     material = recorded(run.drive) if isinstance(run.drive, RecordedDrive) else simulated(run.drive)
     _warm_up(run.config, run.own, run.drive)
-    result = replay(material.play(), run.config, lidar_mount=material.lidar_mount)
+    result = replay(material.play(), run.config, detector, lidar_mount=material.lidar_mount)
+    result = replace(result, skipped={**material.skipped, **result.skipped})
     relations = material.relations
     judged = None if relations is None or len(result.stamps) < 2 else judge(result, *relations)
-    score = None if material.simulated is None else corner_score(material.simulated, run.config, every=_JUDGED)
+    simulated_run = material.simulated
+    score = None if simulated_run is None else corner_score(simulated_run, run.config, detector, every=_JUDGED)
     return run_metrics(result, relations=judged, detection=score)
 
 
@@ -114,7 +118,7 @@ def recorded(where: RecordedDrive) -> Material:
     if where.relations is not None:
         with fetched(where.relations) as path:
             relations = read_relations(path)
-    return Material(tuple(messages), mount, relations, damage=damage)
+    return Material(tuple(messages), mount, relations, damage=damage, skipped=dict(recording.skipped))
 
 
 @lru_cache(maxsize=1)
@@ -159,7 +163,8 @@ def _warm_up(config: Config, own: OwnDetector | None, where: SimulatedDrive | Re
     material = recorded(where) if isinstance(where, RecordedDrive) else simulated(where)
     first = _first_scans(material.messages)
     if any(isinstance(message, LaserScan) for message in first):
-        replay(first, config, lidar_mount=material.lidar_mount)
+        detector = None if own is None else load_detector(own, adapted=config.adapted)
+        replay(first, config, detector, lidar_mount=material.lidar_mount)
 
 
 def _first_scans(messages: Sequence[Message]) -> Sequence[Message]:
