@@ -27,3 +27,11 @@ class MapError(ContourslamError):
 
 class MissingExtraError(ContourslamError):
     """An optional library is not installed; the message names the extra to install."""
+
+
+class MessageError(ContourslamError):
+    """What a robot or the server of a fleet sent is damaged, foreign or of a newer version, or cannot be sent."""
+
+
+class JournalError(ContourslamError):
+    """The server of a fleet cannot keep what robots told it, or cannot read what it kept."""

@@ -26,6 +26,8 @@ class KeyframeFact:
         Contour points and normals in the frame of the base: x, y (m), nx, ny.
     seen : ndarray of float32, shape (s, 13)
         Corners and walls with covariance, in the frame of the base: rows of :mod:`contourslam.graph.sightings`.
+    drive : int
+        From 0; a run that went on in a map that was kept has several, and between two there is no odometry.
     """
 
     number: int
@@ -34,6 +36,7 @@ class KeyframeFact:
     blur: float
     points: NDArray[np.float32]
     seen: NDArray[np.float32]
+    drive: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,7 +97,7 @@ def _relations(memory: Memory, settled: Settled) -> Relations:
     graph = memory.graph
     every = joined(graph.factors, graph.ties) if settled.factors is None else settled.factors
     count = every.size()
-    rows = [_relation(every.at(i)) for i in range(count)]
+    rows = [read_relation(every.at(i)) for i in range(count)]
     return Relations(
         np.array([first for first, _, _, _, _ in rows], np.int64),
         np.array([second for _, second, _, _, _ in rows], np.int64),
@@ -108,8 +108,8 @@ def _relations(memory: Memory, settled: Settled) -> Relations:
     )
 
 
-def _relation(factor: Any) -> tuple[int, int, Floats, Floats, float]:
-    """Two keyframes, the second seen from the first, information, width of the kernel."""
+def read_relation(factor: Any) -> tuple[int, int, Floats, Floats, float]:
+    """Give what a factor binds: two keyframes (the first -1 for the map), pose seen from there, information, kernel."""
     noise, robust = factor.noiseModel(), math.nan
     if isinstance(noise, gtsam.noiseModel.Robust):
         kernel: Any = noise.robust()

@@ -1,0 +1,85 @@
+"""What a robot has told of one run: kept so that it can be told again, and sent no faster than it may be."""
+
+import math
+
+from contourslam.fleet.facts import Answer
+
+WINDOW = 64  # reports that are sent beyond what the server has said that it has
+PATIENCE = 2.0  # s after which a report that the server misses is sent again
+OVERHEAD = 120  # bytes that a message costs beside its own: DDS, UDP and IP headers, a part of an acknowledgement
+
+
+class Allowance:
+    """Bytes that may be sent: so many a second, some seconds' worth at once; changed in place.
+
+    Parameters
+    ----------
+    rate : float
+        Bytes a second, `OVERHEAD` for each message included.
+    saved : float
+        s, for which what was not sent may be sent later.
+    """
+
+    def __init__(self, rate: float, saved: float = 4.0) -> None:
+        self._rate, self._most = rate, rate * saved
+        self._left, self._at = self._most, -math.inf
+
+    def renew(self, now: float) -> None:
+        """Let time pass."""
+        if now > self._at:
+            self._left = min(self._left + self._rate * (now - self._at), self._most)
+            self._at = now
+
+    def spend(self, size: int) -> bool:
+        """Take a message's bytes, where any are left; a long one is paid off afterwards."""
+        if self._left <= 0.0:
+            return False
+        self._left -= size + OVERHEAD
+        return True
+
+
+class Outbox:
+    """Reports of one run; changed in place.
+
+    Attributes
+    ----------
+    run : int
+    reports : list of bytes
+        All, by their numbers.
+    received : int
+        As many the server has, as far as it said.
+    """
+
+    def __init__(self, run: int) -> None:
+        self.run = run
+        self.reports: list[bytes] = []
+        self.received = 0
+        self._sent: list[float] = []  # when each was sent last
+        self._missing: tuple[int, ...] = ()
+
+    @property
+    def settled(self) -> bool:
+        """Whether the server has everything."""
+        return self.received >= len(self.reports)
+
+    def add(self, report: bytes) -> None:
+        """Take in the next report."""
+        self.reports.append(report)
+        self._sent.append(-math.inf)
+
+    def answered(self, answer: Answer) -> None:
+        """Take in what the server has and misses; what it has lost it gets again."""
+        self.received, self._missing = answer.received, answer.missing
+
+    def due(self, now: float, allowance: Allowance) -> list[bytes]:
+        """Give the reports to be sent now, oldest first: those that the server misses, and those never sent."""
+        out = []
+        again = [n for n in self._missing if n < len(self._sent) and self._sent[n] <= now - PATIENCE]
+        until = min(self.received + WINDOW, len(self.reports))
+        new = [n for n in range(self.received, until) if self._sent[n] == -math.inf and n not in again]
+        for number in sorted(again + new):
+            if not allowance.spend(len(self.reports[number])):
+                break
+            self._sent[number] = now
+            out.append(self.reports[number])
+        return out
