@@ -10,25 +10,20 @@ from contourslam.contour.contours import Floats
 from contourslam.geometry.angles import wrap
 from contourslam.geometry.poses import between_one, compose_one, inverse, transform
 from contourslam.joining.chart import Chart
-from contourslam.joining.joint import Apart, Evidence, Joint, Reason, Tie
+from contourslam.joining.joint import Apart, Evidence, Joint, Tie
 from contourslam.joining.laying import Laid, lay, thinned
 from contourslam.joining.looks import Look, look, turned_round
 from contourslam.joining.overlay import Overlay, Tally, surfaces_of
 from contourslam.joining.refound import refound
 from contourslam.joining.rivals import best_rival, elsewhere
 from contourslam.joining.ties import ties_of, turned_tie
+from contourslam.joining.verdict import reason
 
 Observer = Callable[[int, int], None]
 
 LIKELY = -10.0  # log-odds of a look from which it is worth a try
 TRIED = 8  # ways of laying that are tried
 AGREE, AGREE_ANGLE, DRIFT = 0.3, math.radians(3.0), 0.02  # two looks that agree: m, rad, and m more per m between
-# What a joint needs. Measured over maps that are known to be related or not: docs/joining.md.
-LEAST_WORTH = 25.0  # m of surfaces that both maps have, less twice those that one saw through
-LEAST_WAY = 4.0  # m
-MOST_CONTRADICTED = 0.03
-MOST_RIVAL = 0.6
-ALIKE = 5.0  # m; from what worth on two maps have something alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +105,8 @@ def _decided(first: Chart, second: Chart, looks: list[Look]) -> Joint | Apart:
     others = [other.tally.worth for other in found[1:] if _differs(best.laid, other.laid, second)]
     rival = max([best_rival(best.overlay), *others, 0.0]) / max(best.tally.worth, 1e-9)
     joint = _joint(first, second, best, min(rival, 1.0))
-    reason = _reason(best.tally, joint.evidence)
-    return joint if reason is None else Apart(reason, joint)
+    missing = reason(joint.evidence)
+    return joint if missing is None else Apart(missing, joint)
 
 
 def _groups(second: Chart, looks: list[Look]) -> list[list[Look]]:
@@ -173,7 +168,7 @@ def _joint(first: Chart, second: Chart, best: _Hypothesis, rival: float) -> Join
     laid, tally = best.laid, best.tally
     corners, walls = refound(first, second, laid)
     way = _way(second, laid)
-    evidence = Evidence(corners, walls, tally.agreeing, tally.contradicted, way, rival)
+    evidence = Evidence(corners, walls, 0.5 * (tally.agreeing + tally.found), tally.contradicted, way, rival)
     method = max(best.looks, key=lambda each: each.odds).method
     return Joint(_pose(second, laid), ties_of(first, second, laid), evidence, method)
 
@@ -192,19 +187,6 @@ def _pose(second: Chart, laid: Laid) -> Floats:
     turn = float(np.arctan2(np.sin(turns).sum(), np.cos(turns).sum()))
     middle = transform(np.array([0.0, 0.0, turn]), own[:, :2].mean(axis=0))
     return np.array([*(there[:, :2].mean(axis=0) - middle), turn])
-
-
-def _reason(tally: Tally, evidence: Evidence) -> Reason | None:
-    """Why not to join; None where nothing speaks against it."""
-    if tally.agreeing < ALIKE:
-        return "nothing alike"
-    if evidence.contradicted > MOST_CONTRADICTED:
-        return "contradicted"
-    if evidence.rival > MOST_RIVAL:
-        return "ambiguous"
-    if tally.worth < LEAST_WORTH or evidence.way < LEAST_WAY:
-        return "too little"
-    return None
 
 
 def inverted(found: Joint | Apart) -> Joint | Apart:

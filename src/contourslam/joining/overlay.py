@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import inverse, transform
+from contourslam.joining.verdict import AGAINST, worth
 from contourslam.kernels import kernel
 from contourslam.localization.free_space import CELL, FreeSpace, see_free
 from contourslam.maps.saved_map import Contoured
@@ -20,7 +21,6 @@ TOUCHES = 0.1  # m; surfaces this near are one
 LOOK_ALIKE = 0.7  # cosine between the directions of two surfaces that may be one
 CLEAR = 2  # cells of free space all around, for a surface to be where there is none
 ROUND = 12.0  # m around the second map, as far as it is shifted
-AGAINST = 2.0  # what a surface that was seen through counts against one that was found
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Tally:
     @property
     def worth(self) -> float:
         """What speaks for it, m."""
-        return 0.5 * (self.agreeing + self.found) - AGAINST * self.through
+        return worth(0.5 * (self.agreeing + self.found), self.contradicted)
 
 
 @kernel
