@@ -25,7 +25,9 @@ _DOOR = 1.0  # m on both sides of an open door that are kept clear
 _ACROSS, _DEEP = 2.4, 3.0  # m from a door into the corridor and into the room
 _COARSE = 10  # points of a way per point of which it is asked whether one may stand there
 _LONGER = 100  # points: two places of a way that are farther apart on it are not neighbours
+_SAME_WAY = 0.7  # cosine of the angle between two ways up to which one counts as following the other
 _STARTS_APART = 1.2  # m
+_TRIES = 16
 _START = 70  # points ahead of a start on which one may stand
 
 
@@ -80,25 +82,35 @@ def ways_of(place: Room | Building, robots: int, length: float, seed: int) -> tu
         ways = _tours(building, robots, length, seed)
     else:
         ways = _laps(room, robots)
-    starts = _starts(ways, robots)
+    starts = _starts(ways, seed)
     if len(starts) < robots:
         raise ConfigError(f"room {room.name}: {robots} robots do not fit; {len(starts)} do")
     return ways, starts
 
 
 def _laps(room: Room, robots: int) -> list[Way]:
-    points = sample_route(room.route)
-    return [Way(points, _stands_apart(points), True)] * robots
+    """The laps of a room, in turns."""
+    laps = room.loops if room.loops and robots > 1 else (room.route,)
+    points = [sample_route(lap) for lap in laps]
+    ways = [Way(lap, stands, True) for lap, stands in zip(points, _stands_apart(points), strict=True)]
+    return [ways[robot % len(ways)] for robot in range(robots)]
 
 
-def _stands_apart(points: Floats) -> NDArray[np.bool_]:
-    """Where a closed way does not come near another part of itself."""
-    some = points[::_COARSE]
-    between = np.hypot(*np.moveaxis(some[:, None] - some[None], 2, 0))
-    steps = np.abs(np.subtract.outer(np.arange(len(some)), np.arange(len(some))))
-    along = np.minimum(steps, len(some) - steps) * _COARSE
-    near = ((between < APART) & (along > _LONGER)).any(axis=1)
-    return np.repeat(~near, _COARSE)[: len(points)]
+def _stands_apart(laps: Sequence[Floats]) -> list[NDArray[np.bool_]]:
+    """Where closed ways do not come near themselves or each other, unless both go the same way."""
+    some = [points[::_COARSE] for points in laps]
+    places, counts = np.concatenate(some), np.array([len(points) for points in some])
+    lap, step = np.repeat(np.arange(len(some)), counts), np.concatenate([np.arange(count) for count in counts])
+    ahead = np.concatenate([np.roll(points, -1, axis=0) - points for points in some])
+    ahead /= np.hypot(*ahead.T)[:, None]
+    apart = np.abs(step[:, None] - step)
+    along = np.where(lap[:, None] == lap, np.minimum(apart, counts[lap] - apart) * _COARSE, _LONGER + 1)
+    near = np.hypot(*np.moveaxis(places[:, None] - places, 2, 0)) < APART
+    clear = ~(near & (along > _LONGER) & (ahead @ ahead.T < _SAME_WAY)).any(axis=1)
+    return [
+        np.repeat(part, _COARSE)[: len(points)]
+        for part, points in zip(np.split(clear, np.cumsum(counts)[:-1]), laps, strict=True)
+    ]
 
 
 def _tours(building: Building, robots: int, length: float, seed: int) -> list[Way]:
@@ -134,25 +146,34 @@ def _stands_clear(points: Floats, building: Building) -> NDArray[np.bool_]:
     return np.repeat(clear, _COARSE)[: len(points)]
 
 
-def _starts(ways: Sequence[Way], robots: int) -> list[int]:
+def _starts(ways: Sequence[Way], seed: int) -> list[int]:
     """Starts of as many robots as fit, one after the other, each as soon on its way as there is room."""
+    chance = stream(seed, TRAFFIC)
     places: list[Floats] = []
     found: list[int] = []
+    begins: dict[int, int] = {}
     for robot, way in enumerate(ways):
-        count = len(way.points)
-        begin = robot * count // robots if way.closed else 0
-        for step in range(0, count, _COARSE):
+        count, begin = len(way.points), 0
+        if way.closed:  # evenly along the lap, from where it is farthest from those who stand already
+            alike = [k for k, other in enumerate(ways) if other is way]
+            if id(way) not in begins:
+                begins[id(way)] = max(chance.integers(count, size=_TRIES).tolist(), key=lambda k: _off(way, k, places))
+            begin = begins[id(way)] + alike.index(robot) * count // len(alike)
+        for step in range(0, count - (0 if way.closed else _START), _COARSE):
             index = (begin + step) % count
             ahead = np.arange(index, index + _START) % count
-            if way.standing[ahead].all() and all(
-                np.hypot(*(way.points[ahead] - place).T).min() > _STARTS_APART for place in places
-            ):
+            if way.standing[ahead].all() and min(_off(way, k, places) for k in ahead[::_COARSE]) > _STARTS_APART:
                 places.append(way.points[index])
                 found.append(index)
                 break
         else:
             return found
     return found
+
+
+def _off(way: Way, index: int, places: Sequence[Floats]) -> float:
+    """Distance from a point of a way to the nearest of some places, m."""
+    return min((float(np.hypot(*(way.points[index] - place))) for place in places), default=np.inf)
 
 
 def next_stand(way: Way, behind: int) -> NDArray[np.int64]:

@@ -56,6 +56,9 @@ class Room:
         Waypoints of one lap; the last leads back to the first. The robot starts at the first, facing the second.
     wall_height : float
         m.
+    loops : tuple of tuples of (x, y)
+        Laps of several robots at once, in turns, that keep to the right of each other; all drive `route` where there
+        are none.
 
     Raises
     ------
@@ -69,6 +72,7 @@ class Room:
     pieces: tuple[Piece, ...]
     route: tuple[tuple[float, float], ...]
     wall_height: float = 2.4
+    loops: tuple[tuple[tuple[float, float], ...], ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.route) < 3:
