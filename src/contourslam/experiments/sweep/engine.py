@@ -177,7 +177,7 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
             _close(client)
         return
     cluster = distributed.LocalCluster(
-        n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+        n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL, env=_ONE_THREAD, preload=_PRELOAD,
     )  # fmt: skip
     try:
