@@ -139,7 +139,7 @@ class CommonMap:
             for number in range(len(run.keys), len(run.keyframes)):
                 key = len(self)
                 self._poses.append(self._guess(run, number, begin))
-                self._keyframes.append(run.as_keyframe(number, self.runs.index(run)))
+                self._keyframes.append(run.as_keyframe(number))
                 self.owners.append((run, number))
                 run.keys.append(key)
         for key in range(begin, len(self)):
@@ -225,10 +225,10 @@ class CommonMap:
         joint : Joint
             How it lies in this one, the keyframes of its ties being those of the two common maps.
         """
-        offset, drive = len(self), len(self.runs)
+        offset = len(self)
         moved = compose(joint.pose, np.array(other._poses).reshape(-1, 3))
-        for key, (keyframe, pose) in enumerate(zip(other._keyframes, moved, strict=True), start=offset):
-            self._keyframes.append(replace(keyframe, drive=drive + keyframe.drive))
+        self._keyframes += other._keyframes
+        for key, pose in enumerate(moved, start=offset):
             self._poses.append(pose)
             self._graph.add(key, pose)
         self.owners += other.owners

@@ -41,7 +41,7 @@ def assemble(runs: Sequence[Run], poses: Floats, order: Sequence[int], bonds: Se
     Parameters
     ----------
     runs : sequence of Run
-        Each becomes a drive.
+        Each becomes a drive, or several where the robot was lost in between.
     poses : ndarray, shape (k, 3)
         Of the keyframes in the frame of the map, by their numbers in the common map.
     order : sequence of int
@@ -71,12 +71,17 @@ def assemble(runs: Sequence[Run], poses: Floats, order: Sequence[int], bonds: Se
             np.array([fact.blur for fact in facts], np.float64),
             np.cumsum([0, *(len(fact.points) for fact in facts)]),
             np.concatenate([np.empty((0, 4), np.float32), *(fact.points for fact in facts)]),
-            np.repeat(np.arange(len(runs)), [len(run.keys) for run in runs]),
+            _drives(runs),
         ),
         _relations(bonds, index, laid),
         Seen(sightings.keys[:n].copy(), found.labels.astype(np.int32), sightings.rows[:n].copy(), missed),
         _stretches(runs, index),
     )
+
+
+def _drives(runs: Sequence[Run]) -> Ints:
+    begun = [number in run.begins for run in runs for number in range(len(run.keys))]
+    return np.cumsum(begun, dtype=np.int64) - 1
 
 
 def _relations(bonds: Sequence[Bond], index: Ints, laid: Floats) -> Relations:

@@ -1,6 +1,7 @@
 """What the server knows of one run of a robot: its facts, in order, and how they hang together."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from contourslam.fleet.facts import Fact, KeyframeFact, RelationFact, StretchFac
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.graph.places import Keyframe
 
+View = tuple[int, int]
+"""Drive of the run, and number of the stretch in it."""
 KEYS = "it names a keyframe that has not been told of"
 
 
@@ -28,7 +31,9 @@ class Run:
     keys : list of int
         Number of each keyframe in the common map that it has been placed in.
     way : list of float
-        Length of the drive up to each keyframe, m.
+        Length of the way up to each keyframe, m; all drives of the run one after the other.
+    begins : list of int
+        First keyframe of each drive.
 
     Parameters
     ----------
@@ -43,6 +48,7 @@ class Run:
         self.stretches: list[StretchFact] = []
         self.keys: list[int] = []
         self.way: list[float] = []
+        self.begins: list[int] = []
         self._known_from: dict[int, RelationFact] = {}
 
     @property
@@ -66,6 +72,8 @@ class Run:
         if isinstance(fact, KeyframeFact):
             if fact.number != count:
                 return f"keyframe {fact.number} comes after keyframe {count - 1}"
+            if not count or fact.drive != self.keyframes[-1].drive:
+                self.begins.append(count)
             self.keyframes.append(fact)
             self.way.append(self.way[-1] + self._step(fact.number) if count else 0.0)
         elif isinstance(fact, RelationFact):
@@ -100,10 +108,27 @@ class Run:
             return fact.first, fact.pose
         return number - 1, between_one(self.keyframes[number - 1].pose, self.keyframes[number].pose)
 
-    def as_keyframe(self, number: int, drive: int) -> Keyframe:
+    def views(self, length: float) -> Iterator[tuple[View, Ints]]:
+        """Give the stretches of each drive of this `length` (m), that begin where the one before is half over.
+
+        Only those whose keyframes are all placed.
+        """
+        ends = [*self.begins[1:], len(self.keyframes)]
+        for drive, (begin, end) in enumerate(zip(self.begins, ends, strict=True)):
+            along = np.array(self.way[begin : min(end, len(self.keys))])
+            if not len(along):
+                return
+            along -= along[0]
+            for k in range(max(math.floor(2.0 * along[-1] / length) - 1, 0)):
+                yield (
+                    (drive, k),
+                    begin + np.flatnonzero((along >= 0.5 * k * length) & (along < (0.5 * k + 1.0) * length)),
+                )
+
+    def as_keyframe(self, number: int) -> Keyframe:
         """Give a keyframe as the graph has it."""
         fact = self.keyframes[number]
-        return Keyframe(fact.stamp, fact.pose, fact.points, fact.blur, drive)
+        return Keyframe(fact.stamp, fact.pose, fact.points, fact.blur, fact.drive)
 
     def chained(self, members: Ints) -> Floats:
         """Poses of keyframes that follow each other, as the run's own contours bind them, seen from the first of them.

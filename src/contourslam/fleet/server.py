@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -12,7 +12,8 @@ from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
-from contourslam.fleet.facts import Answer, Report, Status
+from contourslam.fleet.facts import Answer, Report
+from contourslam.fleet.inbox import Inbox, Source
 from contourslam.fleet.runs import Run
 from contourslam.fleet.server_search import Search
 from contourslam.joining.joint import Joint
@@ -21,17 +22,16 @@ from contourslam.maps.saved_map import SavedMap
 LATEST = 1.0  # s after which keyframes that wait enter the graph, however few
 GROWN = 1.5  # a common map that has grown so much since it was last solved as a whole is solved again
 FEWEST = 60  # keyframes of a common map that is worth it
-Name = tuple[str, int]
-"""Robot and run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that a robot told and that cannot be used.
+    """Something that a robot told and that cannot be used, or that was wrong with what was kept.
 
     Attributes
     ----------
     robot : str
+        Empty for what was kept.
     run : int
     text : str
         What, and what was done about it.
@@ -50,16 +50,26 @@ class Shared:
     ----------
     number : int
     members : tuple of (str, int)
-        Robot and run of each drive of the map, in the order of its drives.
+        Robot and run, in the order of the map's keyframes.
+    counts : tuple of int
+        Keyframes of each of them.
     saved : SavedMap
     joined : tuple of Joined
         How it came about, and on which evidence.
     """
 
     number: int
-    members: tuple[Name, ...]
+    members: tuple[Source, ...]
+    counts: tuple[int, ...]
     saved: SavedMap
     joined: tuple[Joined, ...]
+
+    def frames(self) -> Iterator[tuple[Source, Floats]]:
+        """Give the runs and the poses of their keyframes, each of shape (k, 3)."""
+        if self.saved.keyframes is not None:
+            ends = np.cumsum([0, *self.counts]).tolist()
+            for source, begin, end in zip(self.members, ends, ends[1:], strict=False):
+                yield source, self.saved.keyframes.poses[begin:end]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,91 +84,79 @@ class _Placed:
 
 
 NOWHERE = _Placed(-1, (), -1, np.zeros(3), np.zeros((3, 3)))
-MOST_MISSING = 32  # numbers that an answer lists at most
 MOST_FAULTS = 1000
-
-
-class _Heard:
-    """Reports of one run: in order as far as they go, and the later ones that wait for a missing one."""
-
-    def __init__(self, robot: str, run: int) -> None:
-        self.run = Run(robot, run)
-        self.received = self.told = 0
-        self.later: dict[int, Report] = {}
-        self.status: Status | None = None
-
-    def missing(self) -> tuple[int, ...]:
-        until = max(self.told, max(self.later, default=-1) + 1)
-        gaps = (number for number in range(self.received, until) if number not in self.later)
-        return tuple(number for number, _ in zip(gaps, range(MOST_MISSING), strict=False))
 
 
 class FleetServer:
     """Joins what several robots tell.
 
-    Reports and statuses may come from any thread and cost next to nothing; :meth:`tick` does the work, in one thread.
+    Messages may come in from any thread and cost little; :meth:`tick` does the work, in one thread.
 
     Parameters
     ----------
     config : Config, optional
         Of the refinement of whole maps.
-    keep : callable, optional
-        Called with every report that is new, before it is acknowledged, so that a server which starts again can be
-        given them anew, in any order.
+    inbox : Inbox, optional
+        Where reports are put in order and kept; what it holds from before is taken up. One that keeps nothing by
+        default.
 
     Attributes
     ----------
     search : Search
+
+    Raises
+    ------
+    JournalError
+        If what the inbox holds cannot be read.
     """
 
-    def __init__(self, config: Config | None = None, *, keep: Callable[[Report], None] = lambda report: None) -> None:
-        self._config, self._keep = config or Config(), keep
-        self._lock = threading.Lock()
-        self._heard: dict[Name, _Heard] = {}
-        self._fresh: deque[Report] = deque()
-        self._faults: deque[Fault] = deque(maxlen=MOST_FAULTS)
-        self._placed: dict[Name, _Placed] = {}
+    def __init__(self, config: Config | None = None, *, inbox: Inbox | None = None) -> None:
+        self._config, self._inbox = config or Config(), inbox or Inbox()
+        self._lock = threading.Lock()  # held for moments; what follows is changed under it
+        self._fresh: deque[Report] = deque(self._inbox.kept())
+        self._faults: dict[Fault, None] = {Fault("", 0, trouble): None for trouble in self._inbox.troubles}
+        self._placed: dict[Source, _Placed] = {}
         # All that follows is touched by the thread that ticks alone.
         self._commons: dict[int, CommonMap] = {}
+        self._runs: dict[Source, Run] = {}
         self._where: dict[Run, CommonMap] = {}
         self._numbers = 0
         self._since: dict[int, float] = {}  # common maps in which keyframes wait, and since when
         self._solved: dict[int, int] = {}  # keyframes of each when it was solved as a whole
         self.search = Search()
 
-    def push(self, report: Report) -> None:
-        """Take in a report, in any order, any number of times.
+    def push(self, data: bytes) -> Source:
+        """Take in a report or a status as it came, in any order, any number of times.
 
         Parameters
         ----------
-        report : Report
+        data : bytes
+            See :mod:`contourslam.fleet.wire`.
+
+        Returns
+        -------
+        (str, int)
+            Robot and run that it is from.
+
+        Raises
+        ------
+        MessageError
+            If it is no message; nothing has changed then.
+        JournalError
+            If it cannot be kept; it is not taken then, and the robot will send it again.
         """
         with self._lock:
-            heard = self._heard_of(report.robot, report.run)
-            if report.number < heard.received or report.number in heard.later:
-                return
-            self._keep(report)
-            heard.later[report.number] = report
-            heard.told = max(heard.told, report.number + 1)
-            while heard.received in heard.later:
-                self._fresh.append(heard.later.pop(heard.received))
-                heard.received += 1
+            taken = self._inbox.take(data)
+            self._fresh.extend(taken.reports)
+            if taken.fault:
+                self._note(Fault(*taken.source, taken.fault))
+        return taken.source
 
-    def push_status(self, status: Status) -> None:
-        """Take in a status, which tells how many reports there should be.
-
-        Parameters
-        ----------
-        status : Status
-        """
-        with self._lock:
-            heard = self._heard_of(status.robot, status.run)
-            heard.told = max(heard.told, status.reports)
-            if heard.status is None or status.stamp >= heard.status.stamp:
-                heard.status = status
-
-    def _heard_of(self, robot: str, run: int) -> _Heard:
-        return self._heard.setdefault((robot, run), _Heard(robot, run))
+    def _note(self, fault: Fault) -> None:
+        self._faults.pop(fault, None)
+        self._faults[fault] = None
+        if len(self._faults) > MOST_FAULTS:
+            del self._faults[next(iter(self._faults))]
 
     def tick(self, now: float, budget: float | None = None) -> None:
         """Do what is to be done: place new keyframes, look for joints, solve whole maps anew.
@@ -205,19 +203,16 @@ class FleetServer:
                 if not self._fresh:
                     return
                 report = self._fresh.popleft()
-                run = self._heard[report.robot, report.run].run
+            run = self._runs.setdefault((report.robot, report.run), Run(report.robot, report.run))
             if run not in self._where:
                 self._numbers += 1
                 self._where[run] = self._commons[self._numbers] = CommonMap(self._numbers, [run])
             for fact in report.facts:
                 wrong = run.take(fact)
                 if wrong:
-                    self._complain(run, f"report {report.number}: {wrong}; it is left out")
+                    with self._lock:
+                        self._note(Fault(run.robot, run.number, f"report {report.number}: {wrong}; it is left out"))
             self._since.setdefault(self._where[run].number, now)
-
-    def _complain(self, run: Run, text: str) -> None:
-        with self._lock:
-            self._faults.append(Fault(run.robot, run.number, text))
 
     def _advance(self, common: CommonMap) -> None:
         self._since.pop(common.number, None)
@@ -281,17 +276,27 @@ class FleetServer:
             self._placed = placed
 
     def answers(self) -> tuple[Answer, ...]:
-        """Give an answer for each run that was ever heard of, from any thread."""
-        with self._lock:
-            return tuple(self._answers())
+        """Give an answer for each run that was ever heard of, from any thread.
 
-    def _answers(self) -> Iterator[Answer]:
-        for (robot, run), heard in self._heard.items():
-            at = self._placed.get((robot, run), NOWHERE)
-            yield Answer(
-                robot, run, heard.received, heard.missing(), at.common, at.members or (robot,), at.keyframe, at.pose,
-                at.covariance,
-            )  # fmt: skip
+        Raises
+        ------
+        JournalError
+            If what was received cannot be kept; nothing is acknowledged then.
+        """
+        with self._lock:
+            self._inbox.settle()
+            return tuple(self._answer(source) for source in self._inbox.sources)
+
+    def _answer(self, source: Source) -> Answer:
+        at = self._placed.get(source, NOWHERE)
+        received, missing = self._inbox.state(source)
+        members = at.members or source[:1]
+        return Answer(*source, received, missing, at.common, members, at.keyframe, at.pose, at.covariance)
+
+    def joined(self) -> tuple[Joined, ...]:
+        """Tell which common maps became one, the earliest first; in the thread that ticks."""
+        every = (event for common in self._commons.values() for event in common.joined)
+        return tuple(sorted(every, key=lambda event: event.at))
 
     def faults(self) -> tuple[Fault, ...]:
         """Give what could not be used, the newest last, from any thread."""
@@ -308,5 +313,6 @@ class FleetServer:
 
 
 def _shared(common: CommonMap, saved: SavedMap) -> Shared:
-    members = tuple((run.robot, run.number) for run in common.runs if run.keys)
-    return Shared(common.number, members, saved, common.joined)
+    runs = [run for run in common.runs if run.keys]
+    members = tuple((run.robot, run.number) for run in runs)
+    return Shared(common.number, members, tuple(len(run.keys) for run in runs), saved, common.joined)

@@ -9,42 +9,17 @@ import numpy as np
 from contourslam.contour.contours import Floats, Ints
 from contourslam.fleet.common import CommonMap
 from contourslam.fleet.common_kept import assemble
-from contourslam.fleet.runs import Run
+from contourslam.fleet.runs import Run, View
 from contourslam.geometry.poses import between_one, compose_one
 from contourslam.joining.chart import WAY, Chart
-from contourslam.joining.find import decide
+from contourslam.joining.find import LIKELY, decide
 from contourslam.joining.joint import Apart, Joint
 from contourslam.joining.looks import Look, Method, look, turned_round
 
 LATER = 10  # a chart is drawn anew when one keyframe has come for so many that are in it
-MOST_WAITING = 2000  # views that wait to be looked for; of more the oldest are given up
-
-
-@dataclass(frozen=True, slots=True)
-class Drawn:
-    """A common map as a chart, and where its keyframes are in it.
-
-    Attributes
-    ----------
-    chart : Chart
-    runs : tuple of (Run, int)
-        The run of each drive, and its first keyframe in the chart.
-    views : dict of (Run, int) to int
-        Number in the chart of each view of each run.
-    """
-
-    chart: Chart
-    runs: tuple[tuple[Run, int], ...]
-    views: dict[tuple[Run, int], int]
-
-    def of(self, run: Run, number: int) -> int:
-        """Keyframe in the chart."""
-        return next(first for other, first in self.runs if other is run) + number
-
-    def whose(self, keyframe: int) -> tuple[Run, int]:
-        """Run of a keyframe of the chart, and its number there."""
-        run, first = next(each for each in reversed(self.runs) if each[1] <= keyframe)
-        return run, keyframe - first
+SURE = 5.0  # log-odds of a look after which two common maps are judged at once;
+SELDOM = 2  # else when they have so many views that may be alike, and one more for so many that they were judged by
+MOST_WAITING = 20_000  # views that wait to be looked for; of more the oldest are given up
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +28,8 @@ class Sight:
 
     Attributes
     ----------
-    run, view, keyframe : Run, int, int
-        Whose view was looked for, its number in the run, and the keyframe in its middle.
+    run, view, keyframe : Run, (int, int), int
+        Whose view was looked for, its drive and number, and the keyframe in its middle.
     near, anchor : Run, int
         A keyframe close to where it was found.
     pose : ndarray, shape (3,)
@@ -64,13 +39,48 @@ class Sight:
     """
 
     run: Run
-    view: int
+    view: View
     keyframe: int
     near: Run
     anchor: int
     pose: Floats
     odds: float
     method: Method
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A common map as a chart, and where its keyframes are in it.
+
+    Attributes
+    ----------
+    chart : Chart
+    first : dict of Run to int
+        The run of each drive, in their order, and its first keyframe in the chart.
+    views : dict of (Run, (int, int)) to int
+        Number in the chart of each view of each run.
+    """
+
+    chart: Chart
+    first: dict[Run, int]
+    views: dict[tuple[Run, View], int]
+
+    def holds(self, sight: Sight) -> bool:
+        """Whether the keyframes and the view of a sight are in it, as far as they are of its runs."""
+        for run, number in ((sight.run, sight.keyframe), (sight.near, sight.anchor)):
+            first = self.first.get(run)
+            if first is not None and self.whose(min(first + number, len(self.chart.frames) - 1)) != (run, number):
+                return False
+        return sight.run not in self.first or (sight.run, sight.view) in self.views
+
+    def of(self, run: Run, number: int) -> int:
+        """Keyframe in the chart."""
+        return self.first[run] + number
+
+    def whose(self, keyframe: int) -> tuple[Run, int]:
+        """Run of a keyframe of the chart, and its number there."""
+        run, first = next(each for each in reversed(self.first.items()) if each[1] <= keyframe)
+        return run, keyframe - first
 
 
 class Search:
@@ -87,8 +97,10 @@ class Search:
     def __init__(self) -> None:
         self.looks = self.given_up = 0
         self._viewed: dict[Run, int] = {}
-        self._waiting: deque[tuple[Run, int, CommonMap]] = deque()
+        self._waiting: deque[tuple[Run, View, Ints, CommonMap]] = deque()
         self._sights: dict[frozenset[int], list[Sight]] = {}
+        self._piece: tuple[Run, View, Chart] | None = None  # the view that was looked for last
+        self._again: dict[frozenset[int], int] = {}  # views of two common maps at which they are judged next
         self._drawn: dict[int, Drawn] = {}
 
     def __len__(self) -> int:
@@ -98,11 +110,10 @@ class Search:
         """Note the views that the runs of a common map have finished, to be looked for in the other ones."""
         others = list(others)
         for run in common.runs:
-            before = self._viewed.get(run, 0)
-            count = max(int(run.way[len(run.keys) - 1] / (0.5 * WAY)) - 1, 0) if run.keys else 0
-            for view in range(before, count):
-                self._waiting.extend((run, view, other) for other in others)
-            self._viewed[run] = max(count, before)
+            views = list(run.views(WAY))
+            for view, members in views[self._viewed.get(run, 0) :]:
+                self._waiting.extend((run, view, members, other) for other in others)
+            self._viewed[run] = max(len(views), self._viewed.get(run, 0))
         while len(self._waiting) > MOST_WAITING:
             self._waiting.popleft()
             self.given_up += 1
@@ -120,14 +131,15 @@ class Search:
         (CommonMap, CommonMap, Joint) or None
             Two that overlap, the older first, with the joint in the numbers of their keyframes.
         """
-        run, view, other = self._waiting.pop()
+        run, view, members, other = self._waiting.pop()
         own = where[run]
         if not other.runs or own is other:  # has become part of another one, or of this
             return None
         target = self._draw(other)
-        piece, first = _piece(run, view)
+        if self._piece is None or self._piece[:2] != (run, view):
+            self._piece = run, view, _piece(run, members)
         self.looks += 1
-        found = look(target.chart, piece, 0)
+        found = [each for each in look(target.chart, self._piece[2], 0) if each.odds > LIKELY]
         if not found:
             return None
         pair = frozenset((own.number, other.number))
@@ -137,7 +149,12 @@ class Search:
             nearest = int(np.argmin(np.hypot(*(frames.poses[:, :2] - each.pose[:2]).T)))
             near, anchor = target.whose(nearest)
             pose = between_one(frames.poses[nearest], each.pose)
-            kept.append(Sight(run, view, first + each.keyframe, near, anchor, pose, each.odds, each.method))
+            kept.append(Sight(run, view, int(members[each.keyframe]), near, anchor, pose, each.odds, each.method))
+        views = len({(each.run, each.view) for each in kept})
+        if views < self._again.get(pair, 0) and max(each.odds for each in found) < SURE:
+            return None
+        # Those found apart are judged ever more seldom: the answer gets dearer as they grow.
+        self._again[pair] = views + 1 + views // SELDOM
         return self._decide(own, other, kept)
 
     def _decide(
@@ -157,6 +174,7 @@ class Search:
             self._drawn.pop(number, None)
         for pair in [pair for pair in self._sights if gone.number in pair]:
             sights = self._sights.pop(pair)
+            self._again.pop(pair, None)
             into = frozenset(pair - {gone.number} | {kept.number})
             if len(into) == 2:
                 self._sights.setdefault(into, []).extend(sights)
@@ -171,27 +189,25 @@ class Search:
         if drawn is not None:
             count = len(drawn.chart.frames)
             new = len(common) - count
-            if new * LATER < count and all(key in drawn.views for key in _views_in(common, sights)):
+            if new * LATER < count and all(drawn.holds(sight) for sight in sights):
                 return drawn
         drawn = self._drawn[common.number] = _draw(common)
         return drawn
-
-
-def _views_in(common: CommonMap, sights: Iterable[Sight]) -> Iterator[tuple[Run, int]]:
-    return ((sight.run, sight.view) for sight in sights if sight.run in common.runs)
 
 
 def _draw(common: CommonMap) -> Drawn:
     saved, _ = common.kept()
     chart = Chart(saved)
     begins = np.cumsum([0, *(len(run.keys) for run in common.runs)]).tolist()
-    views: dict[tuple[Run, int], int] = {}
-    count: dict[int, int] = {}
+    drawn = Drawn(chart, dict(zip(common.runs, begins, strict=False)), {})
+    counts: dict[int, int] = {}
     for number, members in enumerate(chart.stretches):
+        run, first = drawn.whose(int(members[0]))
         drive = int(chart.frames.drives[members[0]])
-        views[common.runs[drive], count.get(drive, 0)] = number
-        count[drive] = count.get(drive, 0) + 1
-    return Drawn(chart, tuple(zip(common.runs, begins, strict=False)), views)
+        own = sum(begin <= first for begin in run.begins) - 1
+        drawn.views[run, (own, counts.get(drive, 0))] = number
+        counts[drive] = counts.get(drive, 0) + 1
+    return drawn
 
 
 def _key(drawn: Drawn, keyframe: int) -> int:
@@ -199,25 +215,21 @@ def _key(drawn: Drawn, keyframe: int) -> int:
     return run.keys[number]
 
 
-def _piece(run: Run, view: int) -> tuple[Chart, int]:
-    """Give one view of a run as a chart of its own, and its first keyframe."""
-    way = np.array(run.way[: len(run.keys)])
-    members: Ints = np.flatnonzero((way >= 0.5 * view * WAY) & (way < (0.5 * view + 1.0) * WAY))
-    first = int(members[0])
+def _piece(run: Run, members: Ints) -> Chart:
+    """Give one view of a run as a chart of its own."""
     part = Run(run.robot, run.number)
-    part.keyframes = run.keyframes[first : int(members[-1]) + 1]
+    part.keyframes, part.begins = run.keyframes[members[0] : members[-1] + 1], [0]
     part.keys = list(range(len(members)))
-    return Chart(assemble([part], run.chained(members), part.keys, [])), first
+    return Chart(assemble([part], run.chained(members), part.keys, []))
 
 
 def _laid(sights: Iterable[Sight], first: Drawn, second: Drawn) -> Iterator[Look]:
     """Give what was seen as looks of the second chart in the first, as the charts are now."""
-    firsts = {run for run, _ in first.runs}
     for sight in sights:
-        back = sight.run in firsts
+        back = sight.run in first.first
         inside, of = (second, first) if back else (first, second)
-        if (sight.run, sight.view) not in of.views:
-            continue
+        if not (of.holds(sight) and inside.holds(sight)):
+            continue  # a view that has come out a little shorter in the chart
         pose = compose_one(inside.chart.frames.poses[inside.of(sight.near, sight.anchor)], sight.pose)
         number = of.views[sight.run, sight.view]
         found = Look(number, of.of(sight.run, sight.keyframe), pose, sight.odds, sight.method)
