@@ -9,6 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
+from contourslam.report.naming import LABELS as LABELS
+from contourslam.report.naming import label as label
+
 P = ParamSpec("P")
 
 BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = (
@@ -17,12 +20,6 @@ BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = (
 INK, GREY, FAINT = "#222222", "#767676", "#c9c9c9"
 
 COLOURS = {"matched_filter": BLUE, "wu": GREEN, "teh_chin": VERMILION, "curvature_scale_space": PURPLE}
-LABELS = {
-    "matched_filter": "matched filter",
-    "wu": "Wu",
-    "teh_chin": "Teh-Chin",
-    "curvature_scale_space": "CSS",
-}
 _OTHERS = (ORANGE, SKY, INK, GREY)
 
 STYLE: dict[Any, Any] = {
@@ -87,11 +84,6 @@ LINES = (
     (ORANGE, (0, (7, 2))), (SKY, (0, (3, 1, 1, 1, 1, 1))), (INK, (0, (2, 2))), (GREY, "-"),
 )  # fmt: skip
 """Colour and dashes of the first run, the second and so on: what has no colour is told by its dashes."""
-
-
-def label(detector: str) -> str:
-    """Name of a detector as the figures and tables show it."""
-    return LABELS.get(detector, detector.replace("_", " "))
 
 
 def colour(detector: str) -> str:

@@ -138,6 +138,11 @@ def definitions(terms: dict[str, str]) -> str:
     return f"<dl>{''.join(pairs)}</dl>"
 
 
+def bullets(texts: Sequence[str]) -> str:
+    """Give a list."""
+    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
+
+
 def tiles(figures: Sequence[tuple[str, str, str]]) -> str:
     """Give the headline figures: value, what it is, and what to hold it against."""
     body = "".join(

@@ -1,0 +1,52 @@
+"""``contourslam sweep-report``: tables, figures and tests of a sweep."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from contourslam.cli.console import chosen, keep_apart, prepare_folder, print_json
+from contourslam.cli.options import Json, Output, Overwrite
+
+
+@dataclass(frozen=True)
+class SweepReport:
+    """Report what a sweep found: means with intervals, and which detector is shown to be better than which.
+
+    The folder gets index.html (opens offline), tables/ as CSV and LaTeX, figures/ as SVG, and metrics.json. Detectors
+    are held against each other drive by drive, and the p-values of a table are corrected for their number; failed runs
+    are counted and listed. Results can be reported while the sweep still runs.
+
+    Example: contourslam sweep-report out/sweep -o out/sweep-report
+    """
+
+    results: tyro.conf.Positional[tuple[str, ...]]
+    """Folders or URLs that `contourslam sweep -o` wrote; several are reported as one."""
+    output: Output
+    overwrite: Overwrite = False
+    metric: str = "position"
+    """What detectors are compared by in simulated rooms: position, x, y, heading, landmarks or false_negatives."""
+    markdown: Path | None = None
+    """Also write the report into a Markdown file: into its places <!-- sweep:NAME --> <!-- /sweep:NAME -->, or new."""
+    json: Json = False
+
+    def execute(self, command: str) -> int:
+        """Write the report and print what can be said."""
+        from contourslam.report.sweep.markdown import write_markdown
+        from contourslam.report.sweep.measures import COMPARABLE, MEASURES
+        from contourslam.report.sweep.page import write_sweep_report
+        from contourslam.report.sweep.reading import read_sweep
+
+        measure = chosen("metric", self.metric, {name: MEASURES[name] for name in COMPARABLE})
+        keep_apart(self.output, [Path(url) for url in self.results if "://" not in url])
+        sweep = read_sweep(self.results)
+        prepare_folder(self.output, overwrite=self.overwrite)
+        metrics = write_sweep_report(self.output, sweep, measure, command=command)
+        if self.markdown is not None:
+            write_markdown(self.markdown, sweep, measure, command=command)
+        if self.json:
+            print_json(metrics)
+        else:
+            print("\n".join(metrics["findings"]))
+            print(f"\nreport: {self.output / 'index.html'}")
+        return 0

@@ -1,0 +1,142 @@
+"""Error of every detector along an axis of the sweep, with intervals."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.report.naming import label
+from contourslam.report.svg.axes import Axes
+from contourslam.report.svg.colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
+from contourslam.report.svg.drawing import Drawing, drawing
+from contourslam.report.sweep.measures import Measure
+from contourslam.report.sweep.statistics import Summary, summary, wheels
+from contourslam.report.sweep.values import Condition, Sweep
+
+Floats = NDArray[np.float64]
+AxisName = Literal["noise", "beams"]
+
+_COLOURS = {"matched_filter": BLUE, "wu": GREEN, "teh_chin": VERMILION, "curvature_scale_space": PURPLE}
+_OTHERS = (INK, SKY)
+_WIDTH, _HEIGHT = 400.0, 250.0  # px
+_APART = 0.009
+"""Detectors stand so far beside each other, as a part of the axis: equal ones would hide each other."""
+_TITLES = {"noise": "noise of a range (cm)", "beams": "beams a turn"}
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """A measure along an axis, all else as in the middle of the sweep.
+
+    Attributes
+    ----------
+    axis : str
+    conditions : tuple of Condition
+        Two or more, by their place on the axis.
+    detectors : dict of str to tuple of Summary
+    odometry : tuple of Summary
+        Of the wheels alone.
+    """
+
+    axis: AxisName
+    conditions: tuple[Condition, ...]
+    detectors: Mapping[str, tuple[Summary, ...]]
+    odometry: tuple[Summary, ...]
+
+    @property
+    def places(self) -> Floats:
+        """Where the conditions stand on the axis: noise in cm, or beams."""
+        values = [100.0 * (one.noise or 0.0) if self.axis == "noise" else one.beams or 0 for one in self.conditions]
+        return np.array(values, dtype=np.float64)
+
+
+def curves(sweep: Sweep, measure: Measure, room: str, setting: str, axis: AxisName) -> Curves | None:
+    """Take a measure along an axis through the middle of the sweep; None where it was not varied, or is not known."""
+    centre = sweep.centre(setting)
+    if centre is None:
+        return None
+    other: AxisName = "beams" if axis == "noise" else "noise"
+    along = tuple(
+        one
+        for one in sweep.conditions(setting)
+        if getattr(one, other) == getattr(centre, other) and getattr(one, axis) is not None
+    )
+    detectors = {
+        name: tuple(summary(sweep.cell(room, one, name), measure) for one in along) for name in sweep.detectors
+    }
+    if len(along) < 2 or not any(one.known for found in detectors.values() for one in found):
+        return None
+    return Curves(axis, along, detectors, tuple(wheels(sweep, measure, room, one) for one in along))
+
+
+def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
+    """Draw the means along the axis, each with its interval, and the wheels alone; what is what stands above."""
+    x, scale = found.places, measure.scale
+    margin = 0.06 * float(np.ptp(x))
+    span = (float(x.min()) - margin, float(x.max()) + margin)
+    means = {name: scale * np.array([one.interval.mean for one in cells]) for name, cells in found.detectors.items()}
+    bounds = {
+        name: scale * np.array([[one.interval.low, one.interval.high] for one in cells])
+        for name, cells in found.detectors.items()
+    }
+    odometry = scale * np.array([one.interval.mean for one in found.odometry])
+    own = colours(list(means))
+    entries = [(label(name), own[name]) for name in means]
+    if np.isfinite(odometry).any():
+        entries.append(("raw odometry", ORANGE))
+    header, height = _header(title, entries)
+    values = np.concatenate([*means.values(), *(bound.ravel() for bound in bounds.values()), odometry])
+    axes = Axes(
+        span,
+        _logarithmic_span(values),
+        _WIDTH,
+        _HEIGHT,
+        labels=(_TITLES[found.axis], measure.heading),
+        unit=measure.unit,
+        logarithmic=True,
+        offset=(0.0, height - 20.0),
+    )
+    axes.line(x, odometry, ORANGE, 1.6, name="raw odometry")
+    for k, (name, mean) in enumerate(means.items()):
+        at = x + (k - 0.5 * (len(means) - 1)) * _APART * (span[1] - span[0])
+        axes.line(at, mean, own[name], 1.2, name=label(name))
+        whole = (bounds[name] > 0.0).all(axis=1)
+        axes.segments(np.stack([np.repeat(at[whole, None], 2, axis=1), bounds[name][whole]], axis=-1), own[name], 1.6)
+        shown = mean > 0.0
+        axes.dots(np.stack([at[shown], mean[shown]], axis=-1), own[name], 5.5)
+    plain = drawing([axes])
+    taller = plain.height + round(height - 20.0)
+    size = f'height="{plain.height}" viewBox="0 0 {plain.width} {plain.height}"'
+    text = plain.text.replace(size, f'height="{taller}" viewBox="0 0 {plain.width} {taller}"', 1)
+    return Drawing(text.replace("</svg>\n", f"{header}</svg>\n"), plain.width, taller)
+
+
+def _logarithmic_span(values: Floats) -> tuple[float, float]:
+    known = values[np.isfinite(values) & (values > 0.0)]
+    return (0.85 * float(known.min()), 1.2 * float(known.max())) if len(known) else (0.1, 1.0)
+
+
+def _header(title: str, entries: Sequence[tuple[str, str]]) -> tuple[str, float]:
+    """Title and names of the lines, in as many rows as they need, as SVG; and how high it is, px."""
+    parts = [f'<text x="62" y="18" font-weight="600">{escape(title)}</text>']
+    left, top = 62.0, 38.0
+    for name, colour in entries:
+        wide = 36.0 + 6.6 * len(name)
+        if left + wide > 62.0 + _WIDTH + 14.0:
+            left, top = 62.0, top + 18.0
+        parts.append(
+            f'<path d="M{left:.0f} {top - 4:.0f}h16" stroke="{colour}" stroke-width="4"/>'
+            f'<text x="{left + 21:.0f}" y="{top:.0f}">{escape(name)}</text>'
+        )
+        left += wide
+    return "\n".join(parts), top + 16.0
+
+
+def colours(detectors: Sequence[str]) -> dict[str, str]:
+    """Colour of each detector: its own for the four of the paper, others in turn."""
+    others = [name for name in detectors if name not in _COLOURS]
+    more = {name: (*_OTHERS, GREY)[min(k, len(_OTHERS))] for k, name in enumerate(others)}
+    return {name: _COLOURS.get(name) or more[name] for name in detectors}

@@ -1,0 +1,157 @@
+"""The report of a sweep: a page that opens offline, its tables as CSV and LaTeX, its figures as SVG, numbers as JSON.
+
+``metrics.json`` has ``findings`` as sentences; ``cells`` with each setting, room, noise, beams and detector: runs,
+failed runs, and of each measure mean, low, high and count; ``pairs`` with every test, those of a table under its name;
+and ``recordings`` with the figures of the real ones.
+"""
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from contourslam import __version__
+from contourslam.atomic import make_folder, remove, write_text
+from contourslam.report.page import album, markup
+from contourslam.report.page.tables import to_csv, to_latex
+from contourslam.report.result_folder import to_json
+from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Points, Table, Words
+from contourslam.report.sweep.measures import MEASURES, Measure
+from contourslam.report.sweep.parts import Parts
+from contourslam.report.sweep.statistics import Pair, summary
+from contourslam.report.sweep.values import Sweep
+
+_OWN = re.compile(r"(table_one|paper|cells|matrix|pairs|logs|failures|noise|beams)(_.*)?\.(csv|tex|svg)")
+"""What an earlier report may have left in ``tables/`` and ``figures/``."""
+
+
+def write_sweep_report(folder: Path, sweep: Sweep, measure: Measure, *, command: str = "") -> dict[str, Any]:
+    """Write ``index.html``, ``tables/``, ``figures/`` and ``metrics.json``.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where needed. Tables and figures that an earlier report left here are removed; other files stay.
+    sweep : Sweep
+    measure : Measure
+        What detectors are compared by in simulated rooms.
+    command : str
+        The command line, shown as it stands.
+
+    Returns
+    -------
+    dict
+        What ``metrics.json`` holds.
+
+    Raises
+    ------
+    ResultError
+        If a file cannot be written.
+    MissingExtraError
+        If SciPy is not installed.
+    """
+    parts = Parts(sweep, measure, command)
+    metrics = sweep_metrics(parts)
+    for name in ("tables", "figures"):
+        make_folder(folder / name)
+        for path in (folder / name).iterdir():
+            if _OWN.fullmatch(path.name):
+                remove(path)
+    write_text(folder / "metrics.json", to_json(metrics))
+    found = parts.all()
+    sections = [
+        markup.Section(part.anchor, part.title, "\n".join(_html(item, folder) for item in part.items)) for part in found
+    ]
+    missing = 0 if sweep.expected is None else sweep.expected - len(sweep.runs)
+    text = markup.page(
+        "Sweep of landmark detectors",
+        lead=_lead(sweep),
+        sections=sections,
+        footer=f"Written by contourslam {__version__}.",
+        banner=f"INCOMPLETE: {missing:,} runs are not done yet." if missing > 0 else "",
+    )
+    write_text(folder / "index.html", text)
+    return metrics
+
+
+def sweep_metrics(parts: Parts) -> dict[str, Any]:
+    """Collect everything, by the schema of this module."""
+    sweep = parts.sweep
+    return {
+        "contourslam": __version__,
+        "command": parts.command,
+        "metric": parts.measure.name,
+        "runs": len(sweep.runs),
+        "failed": len(sweep.failed),
+        "expected": sweep.expected,
+        "findings": parts.sentences(),
+        "cells": [
+            {
+                "setting": setting,
+                "room": room,
+                "noise": condition.noise,
+                "beams": condition.beams,
+                "detector": name,
+                "runs": len(runs),
+                "failed": sum(bool(run.error) for run in runs),
+                **{key: asdict(found.interval) for key, one in MEASURES.items() if (found := summary(runs, one)).known},
+            }
+            for setting in sweep.settings
+            for room in sweep.rooms
+            for condition in sweep.conditions(setting)
+            for name in sweep.detectors
+            if (runs := sweep.cell(room, condition, name))
+        ],
+        "pairs": {f"pairs_by_room_{name}": list(map(_pair, found)) for name, found in parts.by_room.items()}
+        | {f"pairs_{name}": list(map(_pair, found)) for name, found in parts.together.items()},
+        "recordings": [
+            {
+                "recording": run.drive.place,
+                "setting": run.condition.setting,
+                "detector": run.detector,
+                "error": run.error or None,
+                **{name: measure.of(run.row) for name, measure in MEASURES.items()},
+            }
+            for run in sweep.recorded
+        ],
+    }
+
+
+def _pair(pair: Pair) -> dict[str, Any]:
+    return asdict(pair) | {"effect": pair.effect, "better": pair.better}
+
+
+def _lead(sweep: Sweep) -> str:
+    drives = len({run.drive for run in sweep.simulated})
+    rooms = ", ".join(room.replace("_", " ") for room in sweep.rooms)
+    said = f"{len(sweep.runs):,} runs of {len(sweep.detectors)} detectors"
+    if drives:
+        said += f" over {drives} simulated drives ({rooms})"
+    if sweep.recorded:
+        said += f"{' and' if drives else ' over'} {len({run.drive for run in sweep.recorded})} real recordings"
+    return f"{said}. “Better” stands here only where a test that is corrected for the number of comparisons says so."
+
+
+def _html(item: Item, folder: Path) -> str:
+    match item:
+        case Words(text, note):
+            return markup.paragraph(text, "note" if note else "")
+        case Points(texts):
+            return markup.bullets(texts)
+        case Heading(text):
+            return markup.heading(text)
+        case Code(text):
+            return markup.verbatim(text)
+        case Table(name, caption, headers, rows):
+            write_text(folder / "tables" / f"{name}.csv", to_csv(headers, rows))
+            write_text(folder / "tables" / f"{name}.tex", to_latex(caption, headers, rows))
+            return markup.table(caption, headers, rows)
+        case Charts(charts):
+            return f'<div class="pair">{"".join(_chart(chart, folder) for chart in charts)}</div>'
+        case Folded(summary, items):
+            return markup.folded(summary, "\n".join(_html(inner, folder) for inner in items))
+
+
+def _chart(chart: Chart, folder: Path) -> str:
+    write_text(folder / "figures" / f"{chart.name}.svg", chart.drawing.text)
+    return album.drawn(chart.drawing, kind="chart", name=chart.name, alt=chart.alt, caption=chart.caption)

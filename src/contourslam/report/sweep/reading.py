@@ -1,0 +1,87 @@
+"""A sweep's results, wherever they lie, as its report needs them."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from contourslam.errors import ResultError
+from contourslam.experiments.sweep.files import open_place
+from contourslam.experiments.sweep.store import read_results
+from contourslam.report.sweep.values import Condition, Drive, Sweep, SweepRun
+
+_HEAVY = ("config", "traceback", "key", "skipped")
+"""Columns that the report does without."""
+_PLACE = ("lidar", "duration", "speed")
+"""Axes that become a part of the place's name where the sweep has several of one."""
+
+
+def read_sweep(urls: Sequence[str]) -> Sweep:
+    """Read the results of one sweep or several, also while they run.
+
+    Parameters
+    ----------
+    urls : sequence of str
+        Paths or URLs of folders that ``contourslam sweep -o`` wrote.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    ResultError
+        If there are no results or no run was done yet, or a file cannot be read.
+    ConfigError, MissingExtraError
+        If the kind of URL is unknown, or its library is not installed.
+    """
+    rows, texts, expected = [], [], 0
+    for url in urls:
+        table = read_results(url)
+        rows += table.drop_columns([name for name in _HEAVY if name in table.column_names]).to_pylist()
+        system, path = open_place(url)
+        experiment = json.loads(system.cat_file(f"{path}/experiment.json"))
+        texts.append(str(experiment["text"]))
+        expected += len(experiment["keys"])
+    if not rows:
+        raise ResultError(f"{', '.join(urls)}: no run is done yet; wait for the first, or go on: contourslam sweep")
+    return sweep_of(rows, texts, expected=expected)
+
+
+def sweep_of(
+    rows: Sequence[Mapping[str, Any]], experiments: Sequence[str] = (), *, expected: int | None = None
+) -> Sweep:
+    """Bring rows together.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        By the columns of :mod:`contourslam.experiments.sweep.rows`; of two of the same run the later one is taken.
+    experiments : sequence of str
+        The experiment files as they stand.
+    expected : int, optional
+        How many runs the experiments have.
+    """
+    several = [name for name in _PLACE if len({row.get(name) for row in rows if row["source"] == "simulation"}) > 1]
+    runs = {(run.drive, run.condition, run.detector): run for row in rows for run in [_run(row, several)]}
+    return Sweep(tuple(runs.values()), tuple(experiments), expected)
+
+
+def _run(row: Mapping[str, Any], several: Sequence[str]) -> SweepRun:
+    simulated = row["source"] == "simulation"
+    setting = str(row["setting"])
+    if simulated:
+        drive = Drive(
+            ", ".join([str(row["room"]), *(_told(name, row.get(name)) for name in several)]), int(row["seed"])
+        )
+        condition = Condition(setting, row.get("noise"), row.get("beams"))
+    else:
+        drive, condition = Drive(str(row["recording"]), 0), Condition(setting, None, None)
+    error = "" if row["status"] == "done" else f"{row.get('error_type')}: {row.get('error')}".splitlines()[0]
+    return SweepRun(drive, condition, str(row["detector"]), simulated, error, row)
+
+
+def _told(name: str, value: Any) -> str:
+    if name == "lidar":
+        return str(value)
+    unit = {"duration": "s", "speed": "m/s"}[name]
+    return f"whole {name}" if value is None else f"{value:g} {unit}"

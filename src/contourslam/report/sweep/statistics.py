@@ -1,0 +1,161 @@
+"""How sure a sweep's figures are: means of cells with their intervals, and detectors tested in pairs."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contourslam.evaluation.paired_tests import (
+    Interval,
+    PairedTest,
+    by_drive,
+    judged,
+    mean_interval,
+    signed_rank,
+)
+from contourslam.report.sweep.measures import Measure
+from contourslam.report.sweep.values import Condition, Drive, Sweep, SweepRun
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A measure over the drives of a cell.
+
+    Attributes
+    ----------
+    interval : Interval
+        Over the drives that were finished and know the measure.
+    runs, failed : int
+    """
+
+    interval: Interval
+    runs: int
+    failed: int
+
+    @property
+    def known(self) -> bool:
+        """Whether there is anything to show."""
+        return self.interval.count > 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two detectors held against each other.
+
+    Attributes
+    ----------
+    place : str
+        Room, or "" for all rooms together.
+    first, second : str
+    test : PairedTest
+        Of the natural logarithms where the measure is compared by its ratio.
+    ratio : bool
+        Whether it is.
+    lost : int
+        Runs of either that failed among those compared.
+    """
+
+    place: str
+    first: str
+    second: str
+    test: PairedTest
+    ratio: bool
+    lost: int
+
+    @property
+    def effect(self) -> float:
+        """Median of how much larger the first's error is: as a part of the second's, or in the measure's unit."""
+        return math.expm1(self.test.median) if self.ratio and self.test.median < math.inf else self.test.median
+
+    @property
+    def better(self) -> str | None:
+        """Name of the one that is shown to be better, if one is."""
+        return {"first better": self.first, "second better": self.second}.get(self.test.verdict)
+
+
+def summary(runs: Iterable[SweepRun], measure: Measure, *, odometry: bool = False) -> Summary:
+    """Mean of a measure over runs, one a drive, with its interval.
+
+    Parameters
+    ----------
+    runs : iterable of SweepRun
+    measure : Measure
+    odometry : bool
+        Of the wheels alone.
+    """
+    found = list(runs)
+    value = measure.of_odometry if odometry else measure.of
+    values = np.array([math.nan if run.error else value(run.row) for run in found], dtype=np.float64)
+    return Summary(mean_interval(values), len(found), sum(bool(run.error) for run in found))
+
+
+def wheels(sweep: Sweep, measure: Measure, place: str, condition: Condition) -> Summary:
+    """Mean of the wheels alone over the drives of a place: each detector's run of a drive has the same wheels."""
+    drives: dict[Drive, SweepRun] = {}
+    for detector in sweep.detectors:
+        for run in sweep.cell(place, condition, detector):
+            if not run.error:
+                drives.setdefault(run.drive, run)
+    return summary(drives.values(), measure, odometry=True)
+
+
+def pairs(
+    sweep: Sweep, measure: Measure, groups: Sequence[tuple[str, Sequence[str]]], conditions: Sequence[Condition]
+) -> list[Pair]:
+    """Test every two detectors in each group of places, corrected for all tests together.
+
+    What a drive was measured with under several conditions is averaged first, so that a drive counts once.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    measure : Measure
+    groups : sequence of (str, sequence of str)
+        Name of a group, and its places.
+    conditions : sequence of Condition
+
+    Returns
+    -------
+    list of Pair
+        Group by group; pairs that share no drive are among them, with nothing shown.
+    """
+    found: list[tuple[str, str, str, PairedTest, int]] = []
+    for name, places in groups:
+        costs = {detector: _costs(sweep, measure, places, conditions, detector) for detector in sweep.detectors}
+        for first, second in combinations(sweep.detectors, 2):
+            one, other = costs[first], costs[second]
+            shared = [key for key in one if key in other]
+            values = [np.array([cost[key] for key in shared], dtype=np.float64) for cost in (one, other)]
+            lost = int(sum(np.isinf(value).sum() for value in values))
+            test = signed_rank(by_drive([drive for drive, _ in shared], *values))
+            found.append((name, first, second, test, lost))
+    tests = judged([test for _, _, _, test, _ in found])
+    return [
+        Pair(name, first, second, test, measure.ratio, lost)
+        for (name, first, second, _, lost), test in zip(found, tests, strict=True)
+    ]
+
+
+def _costs(
+    sweep: Sweep, measure: Measure, places: Sequence[str], conditions: Sequence[Condition], detector: str
+) -> dict[tuple[Drive, Condition], float]:
+    return {
+        (run.drive, condition): _cost(run, measure)
+        for place in places
+        for condition in conditions
+        for run in sweep.cell(place, condition, detector)
+    }
+
+
+def _cost(run: SweepRun, measure: Measure) -> float:
+    if run.error:
+        return math.inf
+    value = measure.of(run.row)
+    if not measure.ratio or math.isnan(value):
+        return value
+    return math.log(value) if value > 0.0 else math.nan

@@ -1,0 +1,88 @@
+import math
+
+import pytest
+
+from contourslam.report.sweep.measures import MEASURES
+from contourslam.report.sweep.reading import sweep_of
+from contourslam.report.sweep.statistics import pairs, summary, wheels
+
+pytest.importorskip("scipy")
+POSITION = MEASURES["position"]
+
+
+def better(found) -> set[tuple[str, str]]:
+    return {(pair.better, pair.place) for pair in found if pair.better is not None}
+
+
+def test_a_detector_that_is_better_is_shown_to_be_and_by_how_much(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows((0.8, 1.0, 1.0, 1.0)))
+    found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+    assert better(found) == {("matched_filter", "")}
+    won = [pair for pair in found if pair.better]
+    assert len(won) == 3
+    assert all(pair.effect == pytest.approx(-0.2, abs=0.02) and pair.test.drives == 24 for pair in won)
+
+
+def test_the_drives_count_and_not_the_cells(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows(seeds=12))
+    for places, drives in ((sweep.rooms, 24), (sweep.rooms[:1], 12)):
+        found = pairs(sweep, POSITION, [("", places)], sweep.conditions("corners"))
+        assert {pair.test.drives for pair in found} == {drives}
+
+
+def test_equal_detectors_are_not_told_apart(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows())
+    assert not better(pairs(sweep, POSITION, [(room, [room]) for room in sweep.rooms], sweep.conditions("corners")))
+
+
+def test_failed_runs_are_counted_and_lose(sweep_rows) -> None:
+    lost = [("wu", seed) for seed in range(11)]
+    sweep = sweep_of(sweep_rows((1.0, 0.5, 1.0, 1.0), failed=lost))
+    cell = summary(sweep.cell("furnished_room", sweep.conditions("corners")[0], "wu"), POSITION)
+    assert (cell.runs, cell.failed, cell.interval.count) == (12, 11, 1)
+    found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+    assert ("wu", "") not in better(found) and ("matched_filter", "") in better(found)
+    assert {pair.lost for pair in found if "wu" in (pair.first, pair.second)} == {110}
+
+
+def test_all_pairs_of_a_table_are_corrected_together(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows((0.98, 1.0, 1.0, 1.0)))
+    one = pairs(sweep, POSITION, [(sweep.rooms[0], sweep.rooms[:1])], sweep.conditions("corners"))
+    both = pairs(sweep, POSITION, [(room, [room]) for room in sweep.rooms], sweep.conditions("corners"))
+    assert both[0].test.p == one[0].test.p
+    assert both[0].test.corrected > one[0].test.corrected > one[0].test.p
+
+
+def test_the_middle_of_a_star_is_where_its_arms_cross(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows(seeds=1))
+    centre = sweep.centre("corners")
+    assert centre is not None and (centre.noise, centre.beams) == (0.01, 500)
+    assert sweep.centre("walls") is None
+
+
+def test_the_wheels_are_those_of_each_drive_once(sweep_rows) -> None:
+    sweep = sweep_of(sweep_rows(failed=[("matched_filter", 0)]))
+    found = wheels(sweep, POSITION, "furnished_room", sweep.conditions("corners")[0])
+    assert found.runs == 12 and found.interval.mean == pytest.approx(0.5)
+
+
+def test_other_lidars_and_lengths_are_other_places(sweep_rows) -> None:
+    rows = sweep_rows(seeds=1, rooms=("large_hall",))
+    longer = [row | {"duration": None, "lidar": "ydlidar_x4", "noise": None, "beams": None} for row in rows]
+    sweep = sweep_of([*rows, *longer])
+    assert sweep.rooms == ["large_hall, paper, 60 s", "large_hall, ydlidar_x4, whole duration"]
+    assert sweep_of(rows).rooms == ["large_hall"]
+
+
+def test_of_two_rows_of_a_run_the_later_one_is_taken(sweep_rows) -> None:
+    rows = sweep_rows(seeds=1)
+    sweep = sweep_of([*rows, rows[0] | {"rmse.x": 1.0, "rmse.y": 0.0}])
+    assert len(sweep.runs) == len(rows)
+    assert max(POSITION.of(run.row) for run in sweep.runs) == 1.0
+
+
+def test_a_measure_that_is_not_there_is_not_known() -> None:
+    assert math.isnan(POSITION.of({"rmse.x": 0.1})) and math.isnan(POSITION.of({"rmse.x": 0.1, "rmse.y": None}))
+    assert MEASURES["time"].of({"scans_per_second": 500.0}) == 0.002
+    assert math.isnan(MEASURES["time"].of({"scans_per_second": 0.0}))
+    assert POSITION.of({"rmse.x": 0.03, "rmse.y": 0.04}) == pytest.approx(0.05)
