@@ -2,13 +2,15 @@
 
 from contourslam.joining.joint import Evidence, Reason
 
-# Measured over maps that are known to be related or not: docs/joining.md.
-MOST_CONTRADICTED = 0.03
-MOST_RIVAL = 0.7
-LEAST_WORTH = 25.0  # m of surfaces that both maps have, less what speaks against
+# Each of these alone would be all the doubt that a joint may leave; parts of them add up. Set between maps that are
+# known to overlap and maps that are known not to: docs/joining.md.
+CONTRADICTED = 0.04  # part of the surfaces that were seen through, where no corner was found again; ...
+CORNERS, MOST_CORNERS = 10, 20  # ... so many make it twice that, and more than the latter no more: furniture is moved
+RIVAL = 0.9  # what speaks for another way of laying them, as a part of what speaks for this one
+LITTLE = 10.0  # m of surfaces that both have
 LEAST_WAY = 4.0  # m
 ALIKE = 5.0  # m of surfaces; below, two maps have nothing alike
-AGAINST = 2.0  # what a surface that was seen through counts against one that was found
+AGAINST = 2.0  # what a surface that was seen through counts against one that was found, where two ways are compared
 
 
 def worth(agreeing: float, contradicted: float) -> float:
@@ -24,17 +26,26 @@ def worth(agreeing: float, contradicted: float) -> float:
     return agreeing * (1.0 - 2.0 * AGAINST * contradicted / max(1.0 - contradicted, 1e-9))
 
 
-def hurdles(evidence: Evidence) -> dict[Reason, float]:
-    """By what factor each limit of a joint is missed; two maps are joined where none is more than 1."""
-    little = LEAST_WORTH / max(worth(evidence.agreeing, evidence.contradicted), 1e-9)
+def doubts(evidence: Evidence) -> dict[Reason, float]:
+    """What is doubtful about a way of laying one map on another; together up to 1 is no hindrance to a joint."""
+    corners = min(evidence.corners, MOST_CORNERS)
     return {
-        "nothing alike": ALIKE / max(evidence.agreeing, 1e-9),
-        "contradicted": evidence.contradicted / MOST_CONTRADICTED,
-        "ambiguous": evidence.rival / MOST_RIVAL,
-        "too little": max(little, LEAST_WAY / max(evidence.way, 1e-9)),
+        "contradicted": evidence.contradicted / (CONTRADICTED * (1.0 + corners / CORNERS)),
+        "ambiguous": evidence.rival / RIVAL,
+        "too little": LITTLE / max(evidence.agreeing, 1e-9),
     }
+
+
+def hurdle(evidence: Evidence) -> float:
+    """By what factor two maps miss what a joint needs; they are joined where it is not above 1."""
+    return max(sum(doubts(evidence).values()), LEAST_WAY / max(evidence.way, 1e-9))
 
 
 def reason(evidence: Evidence) -> Reason | None:
     """Why not to join; None where nothing speaks against it."""
-    return next((name for name, factor in hurdles(evidence).items() if factor > 1.0), None)
+    if evidence.agreeing < ALIKE:
+        return "nothing alike"
+    doubtful = doubts(evidence)
+    if sum(doubtful.values()) > 1.0:
+        return max(doubtful, key=lambda name: doubtful[name])
+    return "too little" if evidence.way < LEAST_WAY else None
