@@ -46,7 +46,7 @@ def test_json_is_the_file_of_metrics(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["sweep-report", str(there), "-o", str(out), "--metric", "x", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((out / "metrics.json").read_text())
-    assert (printed["metric"], printed["runs"], printed["expected"]) == ("x", 6, 12)
+    assert (printed["metrics"], printed["runs"], printed["expected"]) == (["x"], 6, 12)
 
 
 def test_several_results_are_reported_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

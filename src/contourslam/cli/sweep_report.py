@@ -24,8 +24,9 @@ class SweepReport:
     """Folders or URLs that `contourslam sweep -o` wrote; several are reported as one."""
     output: Output
     overwrite: Overwrite = False
-    metric: str = "position"
-    """What detectors are compared by in simulated rooms: position, x, y, heading, landmarks or false_negatives."""
+    metric: tuple[str, ...] = ("position", "false_negatives")
+    """What detectors are compared by in simulated rooms: position, x, y, heading, landmarks, false_negatives. The first
+    is drawn."""
     markdown: Path | None = None
     """Also write the report into a Markdown file: into its places <!-- sweep:NAME --> <!-- /sweep:NAME -->, or new."""
     json: Json = False
@@ -37,16 +38,18 @@ class SweepReport:
         from contourslam.report.sweep.page import write_sweep_report
         from contourslam.report.sweep.reading import read_sweep
 
-        measure = chosen("metric", self.metric, {name: MEASURES[name] for name in COMPARABLE})
+        choices = {name: MEASURES[name] for name in COMPARABLE}
+        measures = [chosen("metric", name, choices) for name in dict.fromkeys(self.metric or COMPARABLE[:1])]
         keep_apart(self.output, [Path(url) for url in self.results if "://" not in url])
         sweep = read_sweep(self.results)
         prepare_folder(self.output, overwrite=self.overwrite)
-        metrics = write_sweep_report(self.output, sweep, measure, command=command)
+        metrics = write_sweep_report(self.output, sweep, measures, command=command)
         if self.markdown is not None:
-            write_markdown(self.markdown, sweep, measure, command=command)
+            write_markdown(self.markdown, sweep, measures, command=command)
         if self.json:
             print_json(metrics)
         else:
-            print("\n".join(metrics["findings"]))
+            for measure in measures:
+                print(f"by the {measure.title}:", *metrics["findings"][measure.name], sep="\n  ")
             print(f"\nreport: {self.output / 'index.html'}")
         return 0

@@ -16,7 +16,9 @@ pytest.importorskip("scipy")
 @pytest.fixture
 def page(sweep_rows: Callable[..., Any], log_rows: list[dict[str, Any]], tmp_path: Path) -> Path:
     sweep = sweep_of([*sweep_rows((0.8, 1.0, 1.0, 1.0), failed=[("wu", 0)]), *log_rows], ["name = 'a'"])
-    write_sweep_report(tmp_path, sweep, MEASURES["position"], command="contourslam sweep-report a -o b")
+    write_sweep_report(
+        tmp_path, sweep, [MEASURES["position"], MEASURES["false_negatives"]], command="contourslam sweep-report a -o b"
+    )
     return tmp_path / "index.html"
 
 

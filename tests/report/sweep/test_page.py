@@ -13,7 +13,7 @@ from contourslam.report.sweep.page import write_sweep_report
 from contourslam.report.sweep.reading import sweep_of
 
 pytest.importorskip("scipy")
-POSITION = MEASURES["position"]
+POSITION = [MEASURES["position"]]
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,9 @@ def report(tmp_path_factory: pytest.TempPathFactory, sweep_rows, log_rows) -> Pa
 
 def test_better_is_said_only_where_a_test_says_so(report: Path) -> None:
     metrics = json.loads((report / "metrics.json").read_text())
-    (together,) = [line for line in metrics["findings"] if "2 rooms and 5 conditions together" in line]
+    (together,) = [line for line in metrics["findings"]["position"] if "2 rooms and 5 conditions together" in line]
     assert "Matched filter is better than" in together and together.count("better") == 1
-    assert {pair["better"] for pair in metrics["pairs"]["pairs_corners"]} == {"matched_filter", None}
+    assert {pair["better"] for pair in metrics["pairs"]["pairs_position_corners"]} == {"matched_filter", None}
     page = (report / "index.html").read_text()
     assert page.count('<td class="better">matched filter is better') == sum(
         pair["better"] is not None for pairs in metrics["pairs"].values() for pair in pairs
@@ -65,7 +65,7 @@ def test_the_page_stands_alone_and_is_well_nested(report: Path, parsed: Any) -> 
 
 def test_every_table_and_figure_is_a_file_too(report: Path) -> None:
     tables = {path.name for path in (report / "tables").iterdir()}
-    assert {"table_one_corners.csv", "table_one_corners.tex", "pairs_corners.csv", "logs.tex"} <= tables
+    assert {"table_one_corners.csv", "table_one_corners.tex", "pairs_position_corners.csv", "logs.tex"} <= tables
     assert len(list((report / "figures").glob("*.svg"))) == 4
 
 
@@ -80,15 +80,25 @@ def test_a_new_report_leaves_nothing_of_an_old_one(report: Path, sweep_rows, tmp
 
 def test_few_drives_of_one_detector_are_reported_without_a_claim(sweep_rows, tmp_path: Path) -> None:
     rows = [row for row in sweep_rows(seeds=2, conditions=[(0.01, 500)]) if row["detector"] == "wu"]
-    metrics = write_sweep_report(tmp_path, sweep_of(rows), MEASURES["heading"])
-    assert all("better" not in line for line in metrics["findings"])
+    metrics = write_sweep_report(tmp_path, sweep_of(rows), [MEASURES["heading"]])
+    assert all("better" not in line for line in metrics["findings"]["heading"])
     two = write_sweep_report(tmp_path, sweep_of(sweep_rows(seeds=2)), POSITION)
-    assert "Too few drives to show anything" in two["findings"][1]
+    assert "Too few drives to show anything" in two["findings"]["position"][1]
+
+
+def test_by_several_metrics_each_is_tested_and_the_first_is_drawn(sweep_rows, tmp_path: Path) -> None:
+    measures = [MEASURES["false_negatives"], *POSITION]
+    metrics = write_sweep_report(tmp_path, sweep_of(sweep_rows((0.8, 1.0, 1.0, 1.0))), measures)
+    assert any("is better" in line for line in metrics["findings"]["position"])
+    assert not any("is better" in line for line in metrics["findings"]["false_negatives"])
+    page = (tmp_path / "index.html").read_text()
+    assert "by position better than" in page and "by false negatives better than" in page
+    assert (tmp_path / "figures" / "noise_corners_furnished_room.svg").read_text().count("false-negative rate") == 1
 
 
 def test_recordings_alone_are_reported(log_rows, tmp_path: Path) -> None:
     metrics = write_sweep_report(tmp_path, sweep_of(log_rows), POSITION)
-    assert metrics["findings"] == [] and len(metrics["recordings"]) == 4
+    assert metrics["findings"] == {"position": []} and len(metrics["recordings"]) == 4
     assert "no interval, no test" in (tmp_path / "index.html").read_text()
 
 

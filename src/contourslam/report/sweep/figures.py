@@ -91,21 +91,21 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
     values = np.concatenate([*means.values(), *(bound.ravel() for bound in bounds.values()), odometry])
     axes = Axes(
         span,
-        _logarithmic_span(values),
+        _span(values, logarithmic=measure.ratio),
         _WIDTH,
         _HEIGHT,
         labels=(_TITLES[found.axis], measure.heading),
         unit=measure.unit,
-        logarithmic=True,
+        logarithmic=measure.ratio,
         offset=(0.0, height - 20.0),
     )
     axes.line(x, odometry, ORANGE, 1.6, name="raw odometry")
     for k, (name, mean) in enumerate(means.items()):
         at = x + (k - 0.5 * (len(means) - 1)) * _APART * (span[1] - span[0])
         axes.line(at, mean, own[name], 1.2, name=label(name))
-        whole = (bounds[name] > 0.0).all(axis=1)
+        whole = np.isfinite(bounds[name]).all(axis=1)
         axes.segments(np.stack([np.repeat(at[whole, None], 2, axis=1), bounds[name][whole]], axis=-1), own[name], 1.6)
-        shown = mean > 0.0
+        shown = np.isfinite(mean)
         axes.dots(np.stack([at[shown], mean[shown]], axis=-1), own[name], 5.5)
     plain = drawing([axes])
     taller = plain.height + round(height - 20.0)
@@ -114,9 +114,11 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
     return Drawing(text.replace("</svg>\n", f"{header}</svg>\n"), plain.width, taller)
 
 
-def _logarithmic_span(values: Floats) -> tuple[float, float]:
-    known = values[np.isfinite(values) & (values > 0.0)]
-    return (0.85 * float(known.min()), 1.2 * float(known.max())) if len(known) else (0.1, 1.0)
+def _span(values: Floats, *, logarithmic: bool) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    if logarithmic:
+        return 0.85 * float(known.min()), 1.2 * float(known.max())
+    return 0.0, 1.1 * max(float(known.max()), 1e-6)
 
 
 def _header(title: str, entries: Sequence[tuple[str, str]]) -> tuple[str, float]:

@@ -39,7 +39,7 @@ def _said(found: Sequence[Pair], measure: Measure) -> str:
             won.setdefault(pair.better, []).append(pair)
     if not won:
         drives = {pair.test.verdict for pair in found} == {"too few drives"}
-        return "too few drives to show anything." if drives else f"no difference shown{_largest(found, measure)}."
+        return "too few drives to show anything." if drives else f"no difference shown{_reach(found, measure)}."
     sentences = []
     for name, pairs in sorted(won.items(), key=lambda entry: -len(entry[1])):
         others = [f"{label(_loser(pair))}{_by(pair, measure)}" for pair in pairs]
@@ -49,13 +49,14 @@ def _said(found: Sequence[Pair], measure: Measure) -> str:
     return f"{'; '.join(sentences)}{left}."
 
 
-def _largest(found: Sequence[Pair], measure: Measure) -> str:
-    """Tell how large the differences are that nothing could be shown of."""
-    effects = [abs(pair.effect) for pair in found if math.isfinite(pair.effect)]
-    if not effects:
+def _reach(found: Sequence[Pair], measure: Measure) -> str:
+    """Tell how large a difference may still be that was not shown, as far as the intervals know."""
+    ends = [pair.plain(end) for pair in found for end in (pair.interval.low, pair.interval.high)]
+    known = [abs(end) for end in ends if math.isfinite(end)]
+    if not known:
         return ""
-    size = f"{100 * max(effects):.1f} %" if measure.ratio else f"{measure.scale * max(effects):.3g} {measure.unit}"
-    return f" (the largest median difference between two is {size})"
+    size = f"{100 * max(known):.1f} %" if measure.ratio else f"{measure.scale * max(known):.3g} {measure.unit}"
+    return f" (the intervals of the mean differences reach to {size})"
 
 
 def _by(pair: Pair, measure: Measure) -> str:

@@ -21,7 +21,7 @@ _PICTURES = "pictures"
 _PLACE = re.compile(r"<!-- sweep:([\w-]+) -->\n.*?<!-- /sweep:\1 -->", re.DOTALL)
 
 
-def write_markdown(path: Path, sweep: Sweep, measure: Measure, *, command: str = "") -> list[Path]:
+def write_markdown(path: Path, sweep: Sweep, measures: Sequence[Measure], *, command: str = "") -> list[Path]:
     """Write the report into a Markdown file, and its figures into ``pictures/`` beside it.
 
     Parameters
@@ -29,7 +29,7 @@ def write_markdown(path: Path, sweep: Sweep, measure: Measure, *, command: str =
     path : Path
         A document with places for parts of the report, which are filled; where there is no file, all parts are written.
     sweep : Sweep
-    measure : Measure
+    measures : sequence of Measure
     command : str
 
     Returns
@@ -42,7 +42,7 @@ def write_markdown(path: Path, sweep: Sweep, measure: Measure, *, command: str =
     ResultError
         If the document has no place, or one for a part that there is none of, or a file cannot be read or written.
     """
-    parts = {part.anchor: part for part in Parts(sweep, measure, command).all()}
+    parts = {part.anchor: part for part in Parts(sweep, measures, command).all()}
     whole = "\n\n".join(f"## {part.title}\n\n{_place(name, '')}" for name, part in parts.items())
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else f"# Sweep of landmark detectors\n\n{whole}\n"

@@ -1,11 +1,12 @@
 """The report of a sweep: a page that opens offline, its tables as CSV and LaTeX, its figures as SVG, numbers as JSON.
 
-``metrics.json`` has ``findings`` as sentences; ``cells`` with each setting, room, noise, beams and detector: runs,
-failed runs, and of each measure mean, low, high and count; ``pairs`` with every test, those of a table under its name;
-and ``recordings`` with the figures of the real ones.
+``metrics.json`` has ``findings`` as sentences by metric; ``cells`` with each setting, room, noise, beams and detector:
+runs, failed runs, and of each measure mean, low, high and count; ``pairs`` with every test, those of a table under its
+name; and ``recordings`` with the figures of the real ones.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ _OWN = re.compile(r"(table_one|paper|cells|matrix|pairs|logs|failures|noise|beam
 """What an earlier report may have left in ``tables/`` and ``figures/``."""
 
 
-def write_sweep_report(folder: Path, sweep: Sweep, measure: Measure, *, command: str = "") -> dict[str, Any]:
+def write_sweep_report(folder: Path, sweep: Sweep, measures: Sequence[Measure], *, command: str = "") -> dict[str, Any]:
     """Write ``index.html``, ``tables/``, ``figures/`` and ``metrics.json``.
 
     Parameters
@@ -33,8 +34,8 @@ def write_sweep_report(folder: Path, sweep: Sweep, measure: Measure, *, command:
     folder : Path
         Made where needed. Tables and figures that an earlier report left here are removed; other files stay.
     sweep : Sweep
-    measure : Measure
-        What detectors are compared by in simulated rooms.
+    measures : sequence of Measure
+        What detectors are compared by in simulated rooms; the first one is drawn.
     command : str
         The command line, shown as it stands.
 
@@ -50,7 +51,7 @@ def write_sweep_report(folder: Path, sweep: Sweep, measure: Measure, *, command:
     MissingExtraError
         If SciPy is not installed.
     """
-    parts = Parts(sweep, measure, command)
+    parts = Parts(sweep, measures, command)
     metrics = sweep_metrics(parts)
     for name in ("tables", "figures"):
         make_folder(folder / name)
@@ -80,11 +81,11 @@ def sweep_metrics(parts: Parts) -> dict[str, Any]:
     return {
         "contourslam": __version__,
         "command": parts.command,
-        "metric": parts.measure.name,
+        "metrics": [measure.name for measure in parts.measures],
         "runs": len(sweep.runs),
         "failed": len(sweep.failed),
         "expected": sweep.expected,
-        "findings": parts.sentences(),
+        "findings": {measure.name: parts.sentences(measure) for measure in parts.measures},
         "cells": [
             {
                 "setting": setting,
@@ -102,8 +103,11 @@ def sweep_metrics(parts: Parts) -> dict[str, Any]:
             for name in sweep.detectors
             if (runs := sweep.cell(room, condition, name))
         ],
-        "pairs": {f"pairs_by_room_{name}": list(map(_pair, found)) for name, found in parts.by_room.items()}
-        | {f"pairs_{name}": list(map(_pair, found)) for name, found in parts.together.items()},
+        "pairs": {
+            f"{name}_{metric}_{setting}": list(map(_pair, found))
+            for name, tests in (("pairs", parts.together), ("pairs_by_room", parts.by_room))
+            for (metric, setting), found in tests.items()
+        },
         "recordings": [
             {
                 "recording": run.drive.place,

@@ -1,14 +1,16 @@
 """The parts of the report, in their order."""
 
 import json
+import re
 from collections.abc import Sequence
+from itertools import product
 
 from contourslam.report.naming import label
 from contourslam.report.sweep import findings, tables
 from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Part, Points, Table, Words
 from contourslam.report.sweep.figures import AxisName, curves, curves_drawing
 from contourslam.report.sweep.measures import MEASURES, Measure
-from contourslam.report.sweep.statistics import Pair, pairs, summary
+from contourslam.report.sweep.statistics import Tests, pairs, summary
 from contourslam.report.sweep.values import Sweep, once
 
 HOW = (
@@ -27,26 +29,27 @@ TIMES = (
 
 
 class Parts:
-    """All parts of the report about one sweep by one measure.
+    """All parts of the report about one sweep.
 
     Parameters
     ----------
     sweep : Sweep
-    measure : Measure
-        What simulated drives are compared by.
+    measures : sequence of Measure
+        What detectors are compared by in simulated rooms; the first one is drawn.
     command : str
         The command line of the report.
     """
 
-    def __init__(self, sweep: Sweep, measure: Measure, command: str = "") -> None:
-        self.sweep, self.measure, self.command = sweep, measure, command
+    def __init__(self, sweep: Sweep, measures: Sequence[Measure], command: str = "") -> None:
+        self.sweep, self.measures, self.command = sweep, measures, command
         rooms = [(room, [room]) for room in sweep.rooms]
-        self.by_room: dict[str, list[Pair]] = {}
-        self.together: dict[str, list[Pair]] = {}
-        for setting in sweep.settings:
+        self.by_room: Tests = {}
+        self.together: Tests = {}
+        for measure, setting in product(measures, sweep.settings):
             centre = sweep.centre(setting)
-            self.by_room[setting] = [] if centre is None else pairs(sweep, measure, rooms, [centre])
-            self.together[setting] = pairs(sweep, measure, [("", sweep.rooms)], sweep.conditions(setting))
+            self.by_room[measure.name, setting] = [] if centre is None else pairs(sweep, measure, rooms, [centre])
+            every = sweep.conditions(setting)
+            self.together[measure.name, setting] = pairs(sweep, measure, [("", sweep.rooms)], every)
 
     def all(self) -> list[Part]:
         """Give those that there is something to say in."""
@@ -63,33 +66,35 @@ class Parts:
         ]
         return [part for part in found if part.items]
 
-    def sentences(self) -> list[str]:
-        """What can be said of the simulated drives."""
+    def sentences(self, measure: Measure) -> list[str]:
+        """What can be said of the simulated drives by a measure."""
         sweep, said = self.sweep, []
         for setting in sweep.settings:
             if centre := sweep.centre(setting):
-                said.append(findings.of_rooms(centre, self.by_room[setting], sweep.rooms, self.measure))
+                said.append(findings.of_rooms(centre, self.by_room[measure.name, setting], sweep.rooms, measure))
             conditions = len(sweep.conditions(setting))
             if conditions > 1 or len(sweep.rooms) > 1:
-                found = self.together[setting]
-                said.append(findings.of_all(setting, found, conditions, len(sweep.rooms), self.measure))
-        if (beside := self._beside_the_paper()) is not None:
+                found = self.together[measure.name, setting]
+                said.append(findings.of_all(setting, found, conditions, len(sweep.rooms), measure))
+        if measure.name == "position" and (beside := self._beside_the_paper()) is not None:
             said.append(beside)
         return said
 
     def _beside_the_paper(self) -> str | None:
         sweep = self.sweep
         centre = sweep.centre(sweep.settings[0]) if sweep.settings else None
-        if centre is None or self.measure.name != "position":
+        if centre is None:
             return None
-        room = sweep.rooms[0]
-        means = {name: summary(sweep.cell(room, centre, name), self.measure).interval.mean for name in sweep.detectors}
+        room, position = sweep.rooms[0], MEASURES["position"]
+        means = {name: summary(sweep.cell(room, centre, name), position).interval.mean for name in sweep.detectors}
         return findings.beside_the_paper(means, room)
 
     def _findings(self) -> Part:
         items: list[Item] = []
         if self.sweep.simulated:
-            items = [Words(f"By the {self.measure.title}:"), Points(self.sentences()), Words(HOW, note=True)]
+            for measure in self.measures:
+                items += [Words(f"By the {measure.title}:"), Points(self.sentences(measure))]
+            items.append(Words(HOW, note=True))
         return Part("findings", "What can be said", items)
 
     def _design(self) -> Part:
@@ -126,7 +131,7 @@ class Parts:
 
     def _table_one(self) -> Part:
         items: list[Item] = [
-            tables.table_one(self.sweep, self.measure, setting, centre, self.by_room[setting])
+            tables.table_one(self.sweep, self.measures, setting, centre, self.by_room)
             for setting in self.sweep.settings
             if (centre := self.sweep.centre(setting)) is not None
         ]
@@ -135,56 +140,67 @@ class Parts:
         return Part("table-one", "Table I", items)
 
     def _along(self, axis: AxisName, title: str) -> Part:
+        first, *others = self.measures
+        items = self._drawn(first, axis)
+        if items:
+            items.append(Words("Points: means over the drives; strokes: their 95 % intervals.", note=True))
+        for measure in others:
+            if more := self._drawn(measure, axis):
+                items.append(Folded(f"By the {measure.title}", more))
+        if items and axis == "noise":
+            cells = [tables.cells_table(self.sweep, first, setting) for setting in self.sweep.settings]
+            items.append(Folded("Every cell as a table", cells))
+        return Part(axis, title, items)
+
+    def _drawn(self, measure: Measure, axis: AxisName) -> list[Item]:
         items: list[Item] = []
         for setting in self.sweep.settings:
-            charts = [chart for room in self.sweep.rooms if (chart := self._chart(room, setting, axis)) is not None]
+            drawn = [self._chart(measure, room, setting, axis) for room in self.sweep.rooms]
+            charts = [chart for chart in drawn if chart is not None]
             if charts:
                 centre = self.sweep.centre(setting)
                 fixed = "" if centre is None else f"{centre.beams} beams" if axis == "noise" else _noise(centre.noise)
                 items += [Heading(f"{label(setting)}, {fixed}"), Charts(charts)]
-        if items:
-            items.append(Words("Points: means over the drives; strokes: their 95 % intervals; logarithmic.", note=True))
-            if axis == "noise":
-                folded = [tables.cells_table(self.sweep, self.measure, setting) for setting in self.sweep.settings]
-                items.append(Folded("Every cell as a table", folded))
-        return Part(axis, title, items)
+        return items
 
-    def _chart(self, room: str, setting: str, axis: AxisName) -> Chart | None:
-        found = curves(self.sweep, self.measure, room, setting, axis)
+    def _chart(self, measure: Measure, room: str, setting: str, axis: AxisName) -> Chart | None:
+        found = curves(self.sweep, measure, room, setting, axis)
         if found is None:
             return None
         first, last = found.conditions[0].name, found.conditions[-1].name
         values = ", ".join(
-            f"{label(name)} {self.measure.text(cells[0].interval.mean)} to {self.measure.text(cells[-1].interval.mean)}"
+            f"{label(name)} {measure.text(cells[0].interval.mean)} to {measure.text(cells[-1].interval.mean)}"
             for name, cells in found.detectors.items()
         )
-        what = f"{self.measure.heading} in the {label(room)}, {label(setting)}"
+        name = f"{axis}_{setting}_{room}" if measure is self.measures[0] else f"{axis}_{measure.name}_{setting}_{room}"
         return Chart(
-            f"{axis}_{setting}_{room}".replace(", ", "_").replace(" ", "_").replace("/", "_"),
-            curves_drawing(found, self.measure, label(room)),
-            alt=f"{what}, from {first} to {last}: {values}",
+            re.sub(r"[^\w.-]+", "_", name),
+            curves_drawing(found, measure, label(room)),
+            alt=f"{measure.heading} in the {label(room)}, {label(setting)}, from {first} to {last}: {values}",
             caption=f"{label(room)}, {label(setting)}",
         )
 
     def _pairs(self) -> Part:
-        sweep, items = self.sweep, list[Item]()
-        if len(sweep.detectors) < 2:
-            return Part("pairs", "Detectors in pairs", items)
-        for setting in sweep.settings:
-            together, apart = self.together[setting], self.by_room[setting]
-            count = len(sweep.conditions(setting))
-            caption = f"{label(setting)}: share of the drives in which the row's detector has the smaller error"
-            over = f"{label(setting)}, all rooms and {findings.counted(count, 'condition')}, by {self.measure.title}"
-            items += [
-                tables.matrix_table(sweep, together, f"matrix_{setting}", caption),
-                tables.pairs_table(together, self.measure, f"pairs_{setting}", over),
-            ]
-            centre = sweep.centre(setting)
-            if centre is not None and apart:
-                each = f"{label(setting)}, {centre.name}, by {self.measure.title}: corrected for all {len(apart)} pairs"
-                table = tables.pairs_table(apart, self.measure, f"pairs_by_room_{setting}", each)
-                items.append(Folded(f"{label(setting)}: room by room", [table]))
+        items: list[Item] = []
+        if len(self.sweep.detectors) > 1:
+            for measure, setting in product(self.measures, self.sweep.settings):
+                items += self._pairs_by(measure, setting)
         return Part("pairs", "Detectors in pairs", items)
+
+    def _pairs_by(self, measure: Measure, setting: str) -> list[Item]:
+        sweep, of = self.sweep, f"{label(setting)}, by {measure.title}"
+        together, apart = self.together[measure.name, setting], self.by_room[measure.name, setting]
+        conditions, end = sweep.conditions(setting), f"{measure.name}_{setting}"
+        share = f"{of}: share of the drives in which the row's detector is better"
+        every = f"{of}, all rooms and {findings.counted(len(conditions), 'condition')}"
+        table = tables.pairs_table(together, measure, f"pairs_{end}", every)
+        items: list[Item] = [tables.matrix_table(sweep, together, f"matrix_{end}", share)]
+        items.append(table if measure is self.measures[0] else Folded(f"{of}: the tests", [table]))
+        if (centre := sweep.centre(setting)) is not None and apart:
+            each = f"{of}, {centre.name}: corrected for all {len(apart)} pairs"
+            rooms = tables.pairs_table(apart, measure, f"pairs_by_room_{end}", each)
+            items.append(Folded(f"{of}: room by room", [rooms]))
+        return items
 
     def _logs(self) -> Part:
         if not self.sweep.recorded:

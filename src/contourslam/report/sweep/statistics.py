@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -54,6 +54,8 @@ class Pair:
     first, second : str
     test : PairedTest
         Of the natural logarithms where the measure is compared by its ratio.
+    interval : Interval
+        Of the mean difference, likewise, over the drives that neither failed on.
     ratio : bool
         Whether it is.
     lost : int
@@ -64,18 +66,27 @@ class Pair:
     first: str
     second: str
     test: PairedTest
+    interval: Interval
     ratio: bool
     lost: int
 
     @property
     def effect(self) -> float:
         """Median of how much larger the first's error is: as a part of the second's, or in the measure's unit."""
-        return math.expm1(self.test.median) if self.ratio and self.test.median < math.inf else self.test.median
+        return self.plain(self.test.median)
+
+    def plain(self, difference: float) -> float:
+        """Turn a difference of logarithms, if it is one, into how much larger the first is as a part of the second."""
+        return math.expm1(difference) if self.ratio and difference < math.inf else difference
 
     @property
     def better(self) -> str | None:
         """Name of the one that is shown to be better, if one is."""
         return {"first better": self.first, "second better": self.second}.get(self.test.verdict)
+
+
+Tests = dict[tuple[str, str], list[Pair]]
+"""Pairs by the names of measure and setting."""
 
 
 def summary(runs: Iterable[SweepRun], measure: Measure, *, odometry: bool = False) -> Summary:
@@ -124,7 +135,7 @@ def pairs(
     list of Pair
         Group by group; pairs that share no drive are among them, with nothing shown.
     """
-    found: list[tuple[str, str, str, PairedTest, int]] = []
+    found: list[Pair] = []
     for name, places in groups:
         costs = {detector: _costs(sweep, measure, places, conditions, detector) for detector in sweep.detectors}
         for first, second in combinations(sweep.detectors, 2):
@@ -132,13 +143,11 @@ def pairs(
             shared = [key for key in one if key in other]
             values = [np.array([cost[key] for key in shared], dtype=np.float64) for cost in (one, other)]
             lost = int(sum(np.isinf(value).sum() for value in values))
-            test = signed_rank(by_drive([drive for drive, _ in shared], *values))
-            found.append((name, first, second, test, lost))
-    tests = judged([test for _, _, _, test, _ in found])
-    return [
-        Pair(name, first, second, test, measure.ratio, lost)
-        for (name, first, second, _, lost), test in zip(found, tests, strict=True)
-    ]
+            differences = by_drive([drive for drive, _ in shared], *values)
+            test, interval = signed_rank(differences), mean_interval(differences)
+            found.append(Pair(name, first, second, test, interval, measure.ratio, lost))
+    tests = judged([pair.test for pair in found])
+    return [replace(pair, test=test) for pair, test in zip(found, tests, strict=True)]
 
 
 def _costs(

@@ -8,18 +8,16 @@ from contourslam.report.page.markup import Cell, Row
 from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.content import Table
 from contourslam.report.sweep.measures import MEASURES, TABLE_I, Measure
-from contourslam.report.sweep.statistics import Pair, Summary, summary, wheels
+from contourslam.report.sweep.statistics import Pair, Summary, Tests, summary, wheels
 from contourslam.report.sweep.values import Condition, Sweep
 
 _NO_INTERVAL = ("nees", "time")
 _PAPER = (("x", 100.0, 1), ("y", 100.0, 1), ("theta", 1e3, 0))
 
 
-def table_one(sweep: Sweep, measure: Measure, setting: str, condition: Condition, tested: Sequence[Pair]) -> Table:
-    """Detectors by rooms under one condition; `tested` are the pairs by `measure` in each of the rooms."""
+def table_one(sweep: Sweep, measures: Sequence[Measure], setting: str, condition: Condition, tested: Tests) -> Table:
+    """Detectors by rooms under one condition; `tested` are the pairs in each of the rooms."""
     columns = [MEASURES[name] for name in TABLE_I]
-    if measure not in columns:
-        columns.insert(0, measure)
     cells = {
         (room, name): [summary(sweep.cell(room, condition, name), column) for column in columns]
         for room in sweep.rooms
@@ -33,12 +31,13 @@ def table_one(sweep: Sweep, measure: Measure, setting: str, condition: Condition
             if (found := cells.get((room, name))) is not None:
                 shown = [shown_mean(columns[i], found[i]) for i in kept]
                 runs = Cell(str(found[0].runs), f"{found[0].failed} failed" if found[0].failed else "")
-                better = ", ".join(label(other) for other in beaten(tested, room, name)) or "–"
-                rows.append(Row(f"{label(room)}, {label(name)}", [*shown, runs, Cell(better)]))
+                better = [Cell(_beaten(tested[one.name, setting], room, name)) for one in measures]
+                rows.append(Row(f"{label(room)}, {label(name)}", [*shown, runs, *better]))
         odometry = [shown_mean(columns[i], wheels(sweep, columns[i], room, condition)) for i in kept]
         if any(cell.text != "–" for cell in odometry):
-            rows.append(Row(f"{label(room)}, raw odometry", [*odometry, Cell(""), Cell("")], aside=True))
-    headers = ["room, detector", *(columns[i].column for i in kept), "drives", f"by {measure.short} better than"]
+            rows.append(Row(f"{label(room)}, raw odometry", [*odometry, *[Cell("")] * (1 + len(measures))], aside=True))
+    headers = ["room, detector", *(columns[i].column for i in kept), "drives"]
+    headers += [f"by {one.short} better than" for one in measures]
     caption = f"{label(setting)}, {condition.name}: RMSE, mean over the drives and its 95 % interval"
     return Table(f"table_one_{setting}", caption, headers, rows)
 
@@ -71,14 +70,26 @@ def cells_table(sweep: Sweep, measure: Measure, setting: str) -> Table:
 def pairs_table(found: Sequence[Pair], measure: Measure, name: str, caption: str) -> Table:
     """Every pair with its test."""
     effect = "first minus second" + ("" if measure.ratio else f" ({measure.unit})")
+    unit = " %" if measure.ratio else ""
     lost = any(pair.lost for pair in found)
-    headers = ["pair", f"{effect}, median", "first smaller in", "drives", "p", "p after Holm", "shown"]
+    headers = [
+        "pair",
+        f"{effect}, median",
+        "mean, 95 % interval",
+        "first smaller in",
+        "drives",
+        "p",
+        "p after Holm",
+        "shown",
+    ]
     rows = []
     for pair in found:
-        test = pair.test
+        test, bounds = pair.test, (pair.interval.low, pair.interval.high)
+        known = math.isfinite(pair.interval.low)
         place = f"{label(pair.place)}: " if pair.place else ""
         cells = [
             Cell(effect_text(pair, measure)),
+            Cell(" to ".join(_signed(pair, measure, end) for end in bounds) + unit if known else "–"),
             Cell("–" if math.isnan(test.share) else f"{100 * test.share:.0f} %"),
             Cell(str(test.drives)),
             Cell(p_text(test.p)),
@@ -104,7 +115,7 @@ def matrix_table(sweep: Sweep, found: Sequence[Pair], name: str, caption: str) -
             share, better = shares.get((one, other), (math.nan, False))
             cells.append(Cell("–" if math.isnan(share) else f"{100 * share:.0f} %", "better" if better else "", better))
         rows.append(Row(label(one), cells))
-    return Table(name, caption, ["smaller error than", *map(label, sweep.detectors)], rows)
+    return Table(name, caption, ["better than", *map(label, sweep.detectors)], rows)
 
 
 def logs_table(sweep: Sweep, measures: Sequence[Measure]) -> Table:
@@ -151,20 +162,22 @@ def shown_mean(measure: Measure, found: Summary) -> Cell:
     return Cell(measure.text(interval.mean), f"{measure.text(interval.low)} to {measure.text(interval.high)}")
 
 
-def beaten(found: Sequence[Pair], place: str, name: str) -> list[str]:
+def _beaten(found: Sequence[Pair], place: str, name: str) -> str:
     """Detectors that one is shown to be better than at a place."""
     won = [pair for pair in found if pair.place == place and pair.better == name]
-    return [pair.second if pair.first == name else pair.first for pair in won]
+    return ", ".join(label(pair.second if pair.first == name else pair.first) for pair in won) or "–"
 
 
 def effect_text(pair: Pair, measure: Measure) -> str:
     """Median difference with its sign."""
     if not math.isfinite(pair.effect):
         return "–" if math.isnan(pair.effect) else f"{label(pair.first if pair.effect > 0 else pair.second)} failed"
-    value = 100.0 * pair.effect if pair.ratio else measure.scale * pair.effect
-    digits = 1 if pair.ratio else measure.digits + 1
-    text = f"{value:+.{digits}f}".replace("-", "−")
-    return text + (" %" if pair.ratio else "")
+    return _signed(pair, measure, pair.test.median) + (" %" if pair.ratio else "")
+
+
+def _signed(pair: Pair, measure: Measure, difference: float) -> str:
+    value = (100.0 if pair.ratio else measure.scale) * pair.plain(difference)
+    return f"{value:+.{1 if pair.ratio else measure.digits + 1}f}".replace("-", "−")
 
 
 def p_text(p: float) -> str:
