@@ -174,13 +174,13 @@ def test_after_the_scheduler_was_killed_no_finished_run_is_repeated(cluster, com
 def test_the_whole_command_killed_goes_on_where_it_was_and_a_run_that_kills_its_worker_becomes_a_row(command, tmp_path):
     (tmp_path / "deadly.py").write_text("import os\n\n\ndef Deadly(adapted):\n    os.kill(os.getpid(), 9)\n")
     path, results = experiment(tmp_path, 12, deadly="deadly.py:Deadly"), tmp_path / "results"
-    sweep = command(path, results, "--jobs", "2")
+    sweep = command(path, results, "--jobs", "1")
     wait_for(lambda: rows(results) >= 3, sweep)
     sweep.kill()  # its scheduler is a part of it, and its workers end without it
     sweep.wait()
     finished = Store(str(results)).status()
     before = Store(str(results)).starts()
-    code, said, complaint = ended(command(path, results, "--jobs", "2"), tmp_path)
+    code, said, complaint = ended(command(path, results, "--jobs", "1"), tmp_path)
     found = json.loads(said)
     assert (code, found["done"], found["complete"]) == (1, 12, True), complaint
     assert [(failed["run"], failed["error_type"]) for failed in found["failed"]] == [

@@ -109,7 +109,7 @@ class _Session:
             self._woken.clear()
             if until == math.inf and self._observer.stopped():
                 # Each worker ends after the run it is at; what waits for a worker ends as soon as it comes to one.
-                self._client.run(stop, self._name)
+                self._tell_stop()
                 until = time.monotonic() + _PATIENCE
             for future in [future for future in waiting if future.done()]:
                 runs, idle = waiting.pop(future)
@@ -131,6 +131,12 @@ class _Session:
         future = self._client.submit(do_task, task, key=f"contourslam-sweep-{self._name}-{self._sent}", pure=False)
         future.add_done_callback(lambda _: self._woken.set())
         return future
+
+    def _tell_stop(self) -> None:
+        try:
+            self._client.run(stop, self._name)
+        except OSError as error:  # no connection, or a time-out
+            raise ContourslamError(_LOST) from error
 
     def _settle(self, future: Any, runs: tuple[Run, ...]) -> tuple[Run, ...]:
         """Book what a task did, and give the runs that are to be sent again because their worker died."""

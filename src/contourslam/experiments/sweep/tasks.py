@@ -74,17 +74,12 @@ def pieces(runs: Sequence[Run], processes: int) -> list[tuple[Run, ...]]:
     return cut
 
 
-def do_task(task: Task) -> list[tuple[str, str]]:
+def do_task(task: Task) -> None:
     """Do the runs of a task that are not done, one after the other.
 
     Parameters
     ----------
     task : Task
-
-    Returns
-    -------
-    list of (str, str)
-        Key and status of each run that was done here.
 
     Raises
     ------
@@ -100,7 +95,7 @@ def do_task(task: Task) -> list[tuple[str, str]]:
     def tell(key: str, status: str) -> None:
         worker.log_event(TOPIC, {"session": task.session, "key": key, "status": status})
 
-    return do_runs(task, tell)
+    do_runs(task, tell)
 
 
 def do_runs(task: Task, tell: Callable[[str, str], None]) -> list[tuple[str, str]]:
@@ -111,6 +106,11 @@ def do_runs(task: Task, tell: Callable[[str, str], None]) -> list[tuple[str, str
     task : Task
     tell : callable
         Called with key and status of each run that is over.
+
+    Returns
+    -------
+    list of (str, str)
+        The same of all that were done here.
     """
     store = Store(task.url)
     over = []
