@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from contourslam.config import Config
 from contourslam.experiments.relocalisation import MOUNT, drive_through, map_of
 from contourslam.geometry.poses import interpolate
+from contourslam.joining.chart import Chart
 from contourslam.maps.file import load_map, save_map
 from contourslam.maps.saved_map import SavedMap
 from contourslam.scan import LaserScan, Odometry, TruePose
@@ -27,10 +29,9 @@ Way = tuple[tuple[float, float], ...]
 CONFIG = Config(back_end="graph")
 DOORS, PITCH, WIDTH, DEPTH, GAP = 8, 3.6, 2.2, 4.0, 1.0  # of a corridor: doors a side, their distance, m, m, m
 STOREY = 2.6  # m
-PAUSE = 60.0  # s; stamps of a log that jump back by more begin another log
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mapped:
     """A map by SLAM, in a frame of its own, and where it really was made.
 
@@ -48,6 +49,11 @@ class Mapped:
     building: str
     saved: SavedMap
     truth: Floats
+
+    @cached_property
+    def chart(self) -> Chart:
+        """The map made ready to be laid on others."""
+        return Chart(self.saved)
 
 
 @dataclass(frozen=True, slots=True)

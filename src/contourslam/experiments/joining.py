@@ -21,7 +21,6 @@ Floats = NDArray[np.float64]
 
 FALSE = 0.5  # m; a tie that is wrong by more binds what does not belong together
 SHARED = 1.5  # m; two drives share the way where they came so near each other
-PIECES = ((0.0, 25.0), (12.5, 37.5), (25.0, 50.0), (50.0, 75.0))  # m of way
 NEAR = 0.3  # m; a landmark this near to a contour point is kept with it
 
 
@@ -46,7 +45,7 @@ class Verdict:
         Distance of each tie from the truth, m; of no meaning for unrelated maps.
     evidence : Evidence or None
     seconds : float
-        CPU time.
+        CPU time, the maps being ready.
     """
 
     first: str
@@ -68,8 +67,9 @@ class Verdict:
 
 def judge(first: Mapped, second: Mapped) -> Verdict:
     """Look for a joint of two maps and hold it against the truth."""
+    charts = first.chart, second.chart
     begin = thread_time()
-    found = find_joint(Chart(first.saved), Chart(second.saved))
+    found = find_joint(*charts)
     seconds = thread_time() - begin
     best = found.best if isinstance(found, Apart) else found
     related = first.building == second.building

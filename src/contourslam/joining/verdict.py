@@ -4,8 +4,9 @@ from contourslam.joining.joint import Evidence, Reason
 
 # Each of these alone would be all the doubt that a joint may leave; parts of them add up. Set between maps that are
 # known to overlap and maps that are known not to: docs/joining.md.
-CONTRADICTED = 0.04  # part of the surfaces that were seen through, where no corner was found again; ...
-CORNERS, MOST_CORNERS = 10, 20  # ... so many make it twice that, and more than the latter no more: furniture is moved
+CONTRADICTED = 0.04  # part of the surfaces that were seen through, where corners tell nothing
+# Furniture is moved, and where corners were found again by more than chance, that is likelier than another building.
+BY_CHANCE, TWICE, MOST = 6, 8, 20  # corners; more than are there by chance that allow for twice as much; that count
 RIVAL = 0.9  # what speaks for another way of laying them, as a part of what speaks for this one
 LITTLE = 10.0  # m of surfaces that both have
 LEAST_WAY = 4.0  # m
@@ -28,9 +29,9 @@ def worth(agreeing: float, contradicted: float) -> float:
 
 def doubts(evidence: Evidence) -> dict[Reason, float]:
     """What is doubtful about a way of laying one map on another; together up to 1 is no hindrance to a joint."""
-    corners = min(evidence.corners, MOST_CORNERS)
+    corners = min(max(evidence.corners - BY_CHANCE, 0), MOST)
     return {
-        "contradicted": evidence.contradicted / (CONTRADICTED * (1.0 + corners / CORNERS)),
+        "contradicted": evidence.contradicted / (CONTRADICTED * (1.0 + corners / TWICE)),
         "ambiguous": evidence.rival / RIVAL,
         "too little": LITTLE / max(evidence.agreeing, 1e-9),
     }
