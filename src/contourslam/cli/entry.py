@@ -27,6 +27,7 @@ COMMANDS = {
     "sweep-report": "Report what a sweep found, with intervals and paired tests.",
     "figures": "Draw figures of runs for a paper, as SVG and PDF.",
     "merge": "Join maps that overlap into one.",
+    "fleet": "Play several robots' recordings to a server that joins them.",
     "localize": "Follow a robot through a recording in a known map.",
     "locate": "Find a robot in a known map from one scan.",
     "world": "Write a simulated room as a world of Gazebo.",

@@ -1,7 +1,7 @@
 """Several robots' messages played side by side, each robot mapping for itself, to one server."""
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import process_time
@@ -100,6 +100,16 @@ class Played:
     told: list[Told] = field(default_factory=list)
     truth: list[TruePose] = field(default_factory=list)
 
+    @property
+    def shift(self) -> float:
+        """From the fleet's time to the recording's clock, s."""
+        return self.told[0].stamp - self.told[0].time
+
+    def online(self, common: int) -> tuple[Floats, Floats]:
+        """Give times, shape (n,), and poses, shape (n, 3), as the robot knew them then, in one common map."""
+        told = [each for each in self.told if each.common == common]
+        return np.array([each.time for each in told]), np.array([each.pose for each in told]).reshape(-1, 3)
+
     def final(self, shared: Shared) -> tuple[Floats, Floats]:
         """Give the times (s) of its scans that are in a common map, shape (n,), and the poses there, shape (n, 3)."""
         poses: list[Floats] = []
@@ -117,10 +127,8 @@ class Played:
         """Give the true poses at some times, shape (n, 3); NaN where the recording holds none."""
         if not self.truth or not len(times):
             return np.full((len(times), 3), np.nan)
-        shift = self.told[0].stamp - self.told[0].time
-        return interpolate(
-            np.array([each.stamp for each in self.truth]), np.array([each.pose for each in self.truth]), times + shift
-        )
+        stamps, poses = np.array([each.stamp for each in self.truth]), np.array([each.pose for each in self.truth])
+        return interpolate(stamps, poses, times + self.shift)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +238,7 @@ class _Server:
         before = process_time()
         if self._restarts and now >= self._restarts[0]:
             self._restarts.pop(0)
+            self.server.answers()  # nobody hears these; the files are let go of
             self.server = self._begun()
         for robot in self._robots.values():
             for data in robot.played.up.arrived(now):
@@ -250,7 +259,6 @@ def play(
     seed: int = 0,
     folder: Path | None = None,
     server_restarts: Sequence[float] = (),
-    on_time: Callable[[float], None] = lambda now: None,
 ) -> Fleet:
     """Play robots side by side, each from its own first message on, to one server.
 
@@ -267,8 +275,6 @@ def play(
         Where the server keeps what it has acknowledged; needed for its restarts.
     server_restarts : sequence of float
         s after the begin at which the server's program dies and begins anew.
-    on_time : callable, optional
-        Called with the time that is reached, s.
 
     Returns
     -------
@@ -285,7 +291,6 @@ def play(
     for now, number, message in heapq.merge(*(_timed(i, p.messages) for i, p in enumerate(players)), key=_order):
         robots[number].take(now, message)
         server.work(now)
-        on_time(now)
     for robot in robots:
         robot.reporter.flush(now)
     until = now + PATIENCE

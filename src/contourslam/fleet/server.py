@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -99,6 +99,9 @@ class FleetServer:
     inbox : Inbox, optional
         Where reports are put in order and kept; what it holds from before is taken up. One that keeps nothing by
         default.
+    sites : mapping of str to str, optional
+        Where each robot drives; robots of different sites are never compared, and one that is not named is at a site
+        with all others that are not.
 
     Attributes
     ----------
@@ -110,8 +113,10 @@ class FleetServer:
         If what the inbox holds cannot be read.
     """
 
-    def __init__(self, config: Config | None = None, *, inbox: Inbox | None = None) -> None:
-        self._config, self._inbox = config or Config(), inbox or Inbox()
+    def __init__(
+        self, config: Config | None = None, *, inbox: Inbox | None = None, sites: Mapping[str, str] | None = None
+    ) -> None:
+        self._config, self._inbox, self._sites = config or Config(), inbox or Inbox(), dict(sites or {})
         self._lock = threading.Lock()  # held for moments; what follows is changed under it
         self._fresh: deque[Report] = deque(self._inbox.kept())
         self._faults: dict[Fault, None] = {Fault("", 0, trouble): None for trouble in self._inbox.troubles}
@@ -166,9 +171,8 @@ class FleetServer:
         now : float
             s, of a clock that never goes back.
         budget : float, optional
-            s of this thread's time after which nothing more is begun but what new reports need; a view that is looked
-            for takes some hundredths, a map that is solved anew some hundredths a metre of way. All is done where left
-            out, but for the solving.
+            s after which nothing more is begun but what new reports need; a view that is looked for takes some
+            hundredths, a map that is solved anew about a hundredth a metre of way. All is done where left out.
         """
         until = None if budget is None else perf_counter() + budget
         self._listen(now)
@@ -179,7 +183,7 @@ class FleetServer:
             found = self.search.step(self._where)
             if found is not None:
                 self._join(*found, now)
-        if until is not None and not len(self.search) and perf_counter() < until:
+        if not len(self.search) and (until is None or perf_counter() < until):
             self._solve_one()
         self._place()
 
@@ -218,7 +222,11 @@ class FleetServer:
         self._since.pop(common.number, None)
         if common.waiting:
             common.advance()
-            self.search.hear(common, (other for other in self._commons.values() if other is not common))
+            others = (other for other in self._commons.values() if other is not common)
+            self.search.hear(common, (other for other in others if self._site(other) == self._site(common)))
+
+    def _site(self, common: CommonMap) -> str | None:
+        return self._sites.get(common.runs[0].robot)
 
     def _join(self, older: CommonMap, younger: CommonMap, joint: Joint, now: float) -> None:
         event = Joined(now, older.number, younger.number, older.members, younger.members, joint)

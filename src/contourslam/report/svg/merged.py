@@ -16,7 +16,7 @@ _MOST_POINTS = 60_000  # of contours: the eye cannot tell more
 
 
 def merged_drawing(saved: SavedMap, names: Sequence[str], keys: Sequence[Ints]) -> Drawing:
-    """Draw contours, walls and corners, and over them the ways; a dot is where each drive begins.
+    """Draw contours, walls and corners, and over them the ways, each a layer; a dot is where each drive begins.
 
     Parameters
     ----------
@@ -33,16 +33,19 @@ def merged_drawing(saved: SavedMap, names: Sequence[str], keys: Sequence[Ints]) 
     points = np.concatenate(every)
     points = points[:: 1 + len(points) // _MOST_POINTS]
     axes = axes_around(np.concatenate([points, saved.walls.end_points.reshape(-1, 2), keyframes.poses[:, :2]]))
-    axes.cloud(points, FAINT, 1.4, 1.0)
-    axes.segments(saved.walls.end_points, GREY, 1.6)
-    if len(saved.corners.ids):
-        axes.squares(saved.corners.positions, GREY, GREY, 3.4)
-    legend = [("wall, corner", GREY)]
+    with axes.layer("contours"):
+        axes.cloud(points, FAINT, 1.4, 1.0)
+    with axes.layer("landmarks"):
+        axes.segments(saved.walls.end_points, GREY, 1.6)
+        if len(saved.corners.ids):
+            axes.squares(saved.corners.positions, GREY, GREY, 3.4)
+    legend = [("contour", FAINT, "contours", True), ("wall, corner", GREY, "landmarks", True)]
     for number, (name, own) in enumerate(zip(names, keys, strict=True)):
-        colour = _WAYS[number % len(_WAYS)]
-        _ways(axes, saved, own, colour)
-        legend.append((name, colour))
-    axes.legend([*legend, ("start of a drive", INK)])
+        colour, layer = _WAYS[number % len(_WAYS)], f"way{number}"
+        with axes.layer(layer):
+            _ways(axes, saved, own, colour)
+        legend.append((name, colour, layer, True))
+    axes.legend(legend)
     return drawing([axes])
 
 

@@ -1,0 +1,151 @@
+"""``contourslam fleet``: several robots' recordings played side by side to one server."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+from contourslam.cli.console import complain, note, prepare_folder, print_json, progress
+from contourslam.cli.interrupt import INTERRUPTED, Interrupt, UntilStopped
+from contourslam.cli.options import Json, Output, Overwrite, Settings
+from contourslam.cli.run import DEFAULTS
+from contourslam.config import Config
+from contourslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from contourslam.fleet.play import Message, Player
+    from contourslam.recordings import Recording
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Play the recordings of several robots side by side, each mapping for itself, to a server that joins them.
+
+    Each recording begins at the same time, whatever its stamps. Each robot tells the server what it learned, in the
+    bytes that it would send over the air, and is told where it is in the common map once the server has found that its
+    map and another one overlap. --loss, --delay and --repeat make the air bad; --restart-robot and --restart-server let
+    a program die and begin anew.
+
+    The folder gets index.html (a page about the fleet), metrics.json, each common map (common1.cmap) with a picture,
+    and of each robot its trajectory in the common map, as it is known at the end and as it was known at the time.
+
+    Example: contourslam fleet out/office/robot1 out/office/robot2 out/office/robot3 -o out/fleet
+    """
+
+    recordings: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings to play, one of each robot: files, or folders of a rosbag2."""
+    output: Output
+    overwrite: Overwrite = False
+    loss: float = 0.0
+    """Part of the messages that is lost, both ways."""
+    delay: float = 0.0
+    """Seconds that a message takes at most; each takes its own time."""
+    repeat: float = 0.0
+    """Part of the messages that arrives twice."""
+    seed: int = 0
+    """Seed of everything that chance decides."""
+    restart_robot: float | None = None
+    """Seconds after which the first robot's program begins anew, knowing nothing."""
+    restart_server: float | None = None
+    """Seconds after which the server's program begins anew, from what it has kept."""
+    json: Json = False
+    settings: Settings = field(default_factory=lambda: DEFAULTS)
+
+    def execute(self, command: str) -> int:
+        """Play the recordings, write the folder and say how it went."""
+        from contourslam.fleet.channel import Air
+        from contourslam.fleet.play import play
+        from contourslam.recordings import open_recording
+        from contourslam.report.fleet_folder import write_fleet_folder
+
+        if len(self.recordings) < 2:
+            raise ConfigError("a fleet is two robots or more: name two recordings or more")
+        _check(self.settings)
+        air = Air(self.loss, self.delay, self.repeat)
+        recordings = [open_recording(path) for path in self.recordings]
+        prepare_folder(self.output, overwrite=self.overwrite)
+        server_restarts = () if self.restart_server is None else (self.restart_server,)
+        with Interrupt() as interrupt, TemporaryDirectory() as kept:
+            sources = [UntilStopped(recording.messages(), interrupt) for recording in recordings]
+            fleet = play(
+                self._players(recordings, sources),
+                self.settings,
+                air,
+                seed=self.seed,
+                folder=Path(kept) if server_restarts else None,
+                server_restarts=server_restarts,
+            )
+        if interrupt.requested and not any(robot.told for robot in fleet.robots):
+            raise KeyboardInterrupt
+        metrics = write_fleet_folder(self.output, fleet, command=command)
+        if self.json:
+            print_json(metrics)
+        else:
+            _tell(metrics, self.output)
+        errors = [source.error for source in sources if source.error is not None]
+        for error in errors:
+            complain(f"{error}; what came before it is in {self.output}")
+        if errors:
+            return 1
+        if interrupt.requested:
+            complain(f"interrupted; what was played until then is in {self.output}")
+            return INTERRUPTED
+        return 0
+
+    def _players(self, recordings: "list[Recording]", sources: "list[UntilStopped[Message]]") -> "list[Player]":
+        import numpy as np
+
+        from contourslam.fleet.play import Player
+
+        names, players = _names(self.recordings), []
+        for number, (name, recording, messages) in enumerate(zip(names, recordings, sources, strict=True)):
+            mount = None if recording.lidar_mount is None else np.array(recording.lidar_mount, np.float64)
+            restarts = () if self.restart_robot is None or number else (self.restart_robot,)
+            # One bar is enough: the others are played beside the first.
+            shown = messages if number else progress(messages, "message of the first robot")
+            players.append(Player(name, shown, mount, restarts))
+        return players
+
+
+def _check(settings: Config) -> None:
+    if settings.back_end != "graph":
+        raise ConfigError("robots of a fleet map with the graph: leave --back-end away, and install contourslam[graph]")
+
+
+def _names(paths: tuple[Path, ...]) -> list[str]:
+    """Give short names that tell the recordings apart and may travel."""
+    from contourslam.report.runs_reading import distinct_names
+
+    names = [re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") or "robot" for name in distinct_names(list(paths))]
+    return [name if names.count(name) == 1 else f"{name}-{number}" for number, name in enumerate(names, 1)]
+
+
+def _tell(metrics: dict[str, Any], folder: Path) -> None:
+    """Print what came out."""
+    for event in metrics["joined"]:
+        print(
+            f"{event['time']:.1f} s: {', '.join(event['members'])} joined with {', '.join(event['joining'])} by "
+            f"{event['method']}: {event['corners']} corners, {event['walls']} walls, {event['agreeing']:.1f} m of "
+            f"surfaces agree, {event['contradicted']:.1%} contradicted, {event['way']:.1f} m of way, "
+            f"best rival {event['rival']:.0%}"
+        )
+    for one in metrics["maps"]:
+        print(
+            f"{folder}/common{one['common']}.cmap: {', '.join(one['members'])}; {one['keyframes']} keyframes, "
+            f"{one['corners']} corners, {one['walls']} walls"
+        )
+    for robot in metrics["robots"]:
+        print(f"{robot['name']}: {robot['messages']} messages, {robot['bytes_per_second']:.0f} bytes/s", end="")
+        if robot["rmse"] is None:
+            print()
+            continue
+        online = "-" if robot["online_rmse"] is None else f"{robot['online_rmse']:.4f} m"
+        print(
+            f"; RMSE in the common frame {robot['rmse']:.4f} m, as known at the time (online) {online}, raw odometry "
+            f"{robot['odometry_rmse']:.3f} m"
+        )
+    for fault in metrics["faults"]:
+        note(f"{fault['robot'] or 'server'}: {fault['text']}")
