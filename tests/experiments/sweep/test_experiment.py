@@ -77,4 +77,5 @@ def test_a_grid_takes_from_the_file_what_it_does_not_say(written):
 
 def test_the_examples_are_experiments():
     examples = Path(__file__).parents[3] / "examples"
-    assert [read_experiment(path).name for path in sorted(examples.glob("sweep*.toml"))] == ["small", "detectors"]
+    names = {path.name: read_experiment(path).name for path in examples.glob("*.toml")}
+    assert {"sweep.toml": "small", "table_one.toml": "table_one"}.items() <= names.items()
