@@ -1,10 +1,13 @@
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from contourslam.cli import main
+from contourslam.cli.console import Bar
+from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.recordings import open_recording
 from contourslam.scan import LaserScan, TruePose
 
@@ -88,3 +91,56 @@ def test_with_a_camera_the_drive_is_the_same_and_pictures_are_in_it(
     seen = recording.camera()
     assert seen is not None and seen[0].field_of_view_deg == 220.0
     assert plain.camera() is None
+
+
+def test_several_robots_are_recorded_each_by_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "-o", str(tmp_path / "fleet"), "--robots", "3", "--duration", "2", "--json"]
+    arguments += ["--room", "office_corridor"]
+    assert main(arguments) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["recordings"] == [str(tmp_path / "fleet" / f"robot{k}") for k in (1, 2, 3)]
+    assert said["complete"] is True and said["seconds"] == 2.0
+    for path, scans in zip(said["recordings"], said["scans"], strict=True):
+        messages = list(open_recording(Path(path)).messages())
+        assert sum(isinstance(m, LaserScan) for m in messages) == scans == 20
+    assert main(arguments) == 1
+    assert "--overwrite" in capsys.readouterr().err
+    assert main([*arguments[:4], "2", *arguments[5:], "--gliding", "--overwrite"]) == 0
+    assert sorted(path.name for path in (tmp_path / "fleet").iterdir()) == ["robot1", "robot2"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--robots", "0"], "at least one robot, got 0"),
+        (["--robots", "-2"], "at least one robot, got -2"),
+        (["--robots", "99"], "furnished_room: 99 robots do not fit; "),
+        (["--robots", "2", "--camera"], "--camera takes its pictures with one robot only"),
+        (["--corridors", "3"], "--corridors says how large office_building is"),
+        (["--corridors", "1", "--room", "office_building"], "corridors must be 2 to 40"),
+    ],
+)
+def test_what_several_robots_cannot_do_is_said_plainly(
+    arguments: list[str], said: str, failure: Failure, tmp_path: Path
+) -> None:
+    assert said in failure("simulate", "-o", tmp_path / "x", *arguments)
+    assert not (tmp_path / "x").exists()
+
+
+def test_ctrl_c_keeps_what_several_robots_have_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def pressed(bar: Bar, fraction: float) -> None:
+        if fraction > 0.01:
+            signal.raise_signal(signal.SIGINT)
+            monkeypatch.undo()
+
+    monkeypatch.setattr(Bar, "to", pressed)
+    arguments = ["simulate", "-o", str(tmp_path / "x"), "--robots", "2", "--duration", "60", "--json"]
+    assert main(arguments) == INTERRUPTED
+    out, err = capsys.readouterr()
+    said = json.loads(out)
+    assert said["complete"] is False and 0.5 < said["seconds"] < 2.0
+    assert "interrupted" in err
+    for path, scans in zip(said["recordings"], said["scans"], strict=True):
+        assert sum(isinstance(m, LaserScan) for m in open_recording(Path(path)).messages()) == scans > 3

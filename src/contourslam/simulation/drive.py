@@ -63,10 +63,6 @@ class Drive:
         step = np.minimum(at.astype(np.int64), self.first + len(self.times) - 2)
         return step - self.first, at - step
 
-    def row(self, time: float) -> int:
-        """Row nearest to a time (s)."""
-        return round(time / self.spacing) - self.first
-
     def truth(self, stamps: Floats) -> Floats:
         """True poses of the base (x, y, heading) at the given times (s), shape (m, 3)."""
         return interpolate(self.times, self.poses, np.asarray(stamps, dtype=np.float64))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contourslam.kernels import kernel
 from contourslam.robot.route import gently, wanted_twist
 
 Floats = NDArray[np.float64]
@@ -64,11 +65,21 @@ class Follower:
     ) -> tuple[float, float]:
         """Forward speed (m/s), at the most so much, and turning speed (rad/s) wanted at a true pose and a time (s)."""
         habits, count = self._habits, len(self._route)
-        x, y, _ = pose
-        ahead = self._route[(self._index + np.arange(_WINDOW)) % count]
-        self._index += int(np.argmin((ahead[:, 0] - x) ** 2 + (ahead[:, 1] - y) ** 2))
+        self._index += _nearest(self._route, self._index, pose[0], pose[1])
         target = self._route[(self._index + round(habits.look_ahead / self._spacing)) % count]
         cruise = min(habits.cruise(time), most)
         v, omega = wanted_twist(pose, (float(target[0]), float(target[1])), cruise, habits.turn_limit)
         self._v, self._omega = gently(self._v, v, ACCELERATION * dt), gently(self._omega, omega, TURN_ACCELERATION * dt)
         return self._v, self._omega
+
+
+@kernel
+def _nearest(route: Floats, first: int, x: float, y: float) -> int:
+    """How many points from the first on the nearest of the next ones is."""
+    best, found = math.inf, 0
+    for step in range(_WINDOW):
+        point = (first + step) % len(route)
+        off = (route[point, 0] - x) ** 2 + (route[point, 1] - y) ** 2
+        if off < best:
+            best, found = off, step
+    return found

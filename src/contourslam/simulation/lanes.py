@@ -1,5 +1,6 @@
 """Where each of several robots drives: on the right, and where it may stand without being in the way of others."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
-from contourslam.robot.route import sample_route
+from contourslam.robot.route import SPACING, sample_route
 from contourslam.simulation.buildings import Building
 from contourslam.simulation.chance import TRAFFIC, seed_of, stream
 from contourslam.simulation.room import Room
@@ -21,12 +22,13 @@ APART = 0.5
 """Between the middles of two robots, at the least, m."""
 _LANE = 0.28  # m to the right of the middle of a corridor
 _MOUTH = 0.86  # m from the middle of a junction, on one's lane: who stands there is in nobody's way
-_DOOR = 1.0  # m on both sides of an open door that are kept clear
+_DOOR = 0.8  # m on both sides of an open door that are kept clear
 _ACROSS, _DEEP = 2.4, 3.0  # m from a door into the corridor and into the room
 _COARSE = 10  # points of a way per point of which it is asked whether one may stand there
 _LONGER = 100  # points: two places of a way that are farther apart on it are not neighbours
 _SAME_WAY = 0.7  # cosine of the angle between two ways up to which one counts as following the other
 _STARTS_APART = 1.2  # m
+_EACH = 8.0  # m of corridor, or of places to wait, per robot: with less they block each other sooner or later
 _TRIES = 16
 _START = 70  # points ahead of a start on which one may stand
 
@@ -72,20 +74,33 @@ def ways_of(place: Room | Building, robots: int, length: float, seed: int) -> tu
     ConfigError
         If so many robots do not fit; the message says how many do.
     """
-    if robots < 1:
-        raise ConfigError(f"there must be at least one robot, got {robots}")
     room = place if isinstance(place, Room) else place.room
     if robots == 1:
         return _laps(room, 1), [0]
     building = place if isinstance(place, Building) else BUILDINGS.get(room.name)
-    if building is not None and building.room == room:
-        ways = _tours(building, robots, length, seed)
-    else:
-        ways = _laps(room, robots)
+    if building is not None and building.room != room:
+        building = None
+    ways = _laps(room, robots) if building is None else _tours(building, robots, length, seed)
     starts = _starts(ways, seed)
-    if len(starts) < robots:
-        raise ConfigError(f"room {room.name}: {robots} robots do not fit; {len(starts)} do")
+    most = min(len(starts), _most(ways) if building is None else int(_lanes(building) / _EACH))
+    if most < robots:
+        while len(_starts(ways[:most], seed)) < most:
+            most -= 1
+        raise ConfigError(f"room {room.name}: {robots} robots do not fit; {most} do")
     return ways, starts
+
+
+def _most(laps: Sequence[Way]) -> int:
+    """How many robots can drive laps without a jam: any number, where nobody has to let others pass."""
+    each = {id(way): way for way in laps}.values()
+    if all(way.standing.all() for way in each):
+        return len(laps)
+    return max(int(sum(int(way.standing.sum()) for way in each) * SPACING / _EACH), len(each))
+
+
+def _lanes(building: Building) -> float:
+    """Length of all corridors that can be driven through, m."""
+    return float(sum(math.dist(*(building.junctions[end] for end in stretch)) for stretch in building.stretches))
 
 
 def _laps(room: Room, robots: int) -> list[Way]:
@@ -177,12 +192,12 @@ def _off(way: Way, index: int, places: Sequence[Floats]) -> float:
 
 
 def next_stand(way: Way, behind: int) -> NDArray[np.int64]:
-    """For each point of a way the first one from it on, so many points behind which a robot may wait.
+    """For each point of a way the first one from it on up to which, from so many points behind it, a robot may wait.
 
     It may lie beyond the last point of a closed way; of an open one, the last point is always one.
     """
     count = len(way.points)
-    stands = np.roll(way.standing, behind)
+    stands = np.all([np.roll(way.standing, k) for k in range(behind + 1)], axis=0)
     if not way.closed:
         stands[:behind], stands[-1] = way.standing[0], True
     twice = np.concatenate([stands, stands]) if way.closed else stands

@@ -10,11 +10,13 @@ from contourslam.simulation.robot import Drum
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_NEAR = 0.6  # m: no part of a robot is farther from where its base is in the middle of a turn
 
 
 def cast_others(
     origins: Floats,
     directions: Floats,
+    found: tuple[Floats, Floats],
     steps: Indices,
     weights: Floats,
     positions: Floats,
@@ -22,12 +24,14 @@ def cast_others(
     drums: tuple[Drum, ...],
     own: int,
 ) -> tuple[Floats, Floats]:
-    """Range (m; inf where it meets nothing) and incidence (rad) of rays that meet the drums of other robots.
+    """Range (m; inf where it meets nothing) and incidence (rad) of rays that may meet other robots.
 
     Parameters
     ----------
     origins, directions : ndarray, shape (n, 3)
         World frame, m; directions of unit length.
+    found : tuple of ndarray, shape (n,)
+        Range and incidence of what they meet of the room.
     steps, weights : ndarray, shape (n,)
         The moment before each beam, and which part of the time to the next one has passed.
     positions, rotations : ndarray, shape (moments, robots, 3) and (moments, robots, 3, 3)
@@ -38,13 +42,15 @@ def cast_others(
         The robot that carries the lidar.
     """
     shapes = np.array([[drum.x, drum.z, drum.radius, drum.half] for drum in drums])
-    return _cast(origins, directions, steps, weights, positions, rotations, shapes, own)
+    return _cast(origins, directions, *found, steps, weights, positions, rotations, shapes, own)
 
 
 @kernel
 def _cast(
     origins: Floats,
     directions: Floats,
+    ranges: Floats,
+    incidences: Floats,
     steps: Indices,
     weights: Floats,
     positions: Floats,
@@ -52,26 +58,30 @@ def _cast(
     shapes: Floats,
     own: int,
 ) -> tuple[Floats, Floats]:
-    ranges, incidences = np.full(len(origins), np.inf), np.zeros(len(origins))
+    ranges, incidences = ranges.copy(), incidences.copy()
+    count, middle = len(origins), steps[len(steps) // 2]
     for robot in range(positions.shape[1]):
         if robot == own:
             continue
-        for n in range(len(origins)):
-            step, part = steps[n], weights[n]
-            before, after = positions[step, robot], positions[step + 1, robot]
-            x = (1.0 - part) * before[0] + part * after[0] - origins[n, 0]
-            y = (1.0 - part) * before[1] + part * after[1] - origins[n, 1]
+        near_x, near_y = positions[middle, robot, 0], positions[middle, robot, 1]
+        for n in range(count):
+            x, y = near_x - origins[n, 0], near_y - origins[n, 1]
             across = x * directions[n, 1] - y * directions[n, 0]
-            if across * across > 0.25:  # far from every part of it
+            along = x * directions[n, 0] + y * directions[n, 1]
+            if abs(across) > _NEAR or along < -_NEAR or along > ranges[n] + _NEAR:
                 continue
-            z = (1.0 - part) * before[2] + part * after[2] - origins[n, 2]
-            axes = rotations[step, robot]
-            for shape in shapes:
+            step, part = steps[n], weights[n]
+            rest = 1.0 - part
+            x = rest * positions[step, robot, 0] + part * positions[step + 1, robot, 0] - origins[n, 0]
+            y = rest * positions[step, robot, 1] + part * positions[step + 1, robot, 1] - origins[n, 1]
+            z = rest * positions[step, robot, 2] + part * positions[step + 1, robot, 2] - origins[n, 2]
+            axes = rest * rotations[step, robot] + part * rotations[step + 1, robot]
+            for k in range(len(shapes)):
                 distance, sine = _meet(
-                    x + shape[0] * axes[0, 0] + shape[1] * axes[0, 2],
-                    y + shape[0] * axes[1, 0] + shape[1] * axes[1, 2],
-                    z + shape[0] * axes[2, 0] + shape[1] * axes[2, 2],
-                    directions[n], shape[2], shape[3],
+                    x + shapes[k, 0] * axes[0, 0] + shapes[k, 1] * axes[0, 2],
+                    y + shapes[k, 0] * axes[1, 0] + shapes[k, 1] * axes[1, 2],
+                    z + shapes[k, 0] * axes[2, 0] + shapes[k, 1] * axes[2, 2],
+                    directions[n], shapes[k, 2], shapes[k, 3],
                 )  # fmt: skip
                 if distance < ranges[n]:
                     ranges[n], incidences[n] = distance, math.asin(min(sine, 1.0))

@@ -1,7 +1,6 @@
 """Several robots in one building: each drives, looks around and is seen by the others; their messages as they come."""
 
 import math
-from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,28 +8,20 @@ from numpy.typing import NDArray
 
 from contourslam.errors import ConfigError
 from contourslam.geometry.rigid import from_planar
-from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.simulation.buildings import Building
-from contourslam.simulation.chance import DRIVER, NOISE, TRAFFIC, seed_of, stream
+from contourslam.simulation.chance import DRIVER, TRAFFIC, seed_of, stream
 from contourslam.simulation.config import SimulationConfig
-from contourslam.simulation.drive import Drive, drive_of, take_place
+from contourslam.simulation.drive import take_place
 from contourslam.simulation.follower import Follower
 from contourslam.simulation.gliding import Gliding
 from contourslam.simulation.lanes import ways_of
-from contourslam.simulation.lidar import IdealScan, SolidCaster, beams, turns
-from contourslam.simulation.noise import measure
-from contourslam.simulation.odometry import Encoders
-from contourslam.simulation.others import cast_others
-from contourslam.simulation.ray_casting import PlaneCaster, outlines
-from contourslam.simulation.robot import drums
 from contourslam.simulation.rolling import STEPS_PER_TICK, TICK, Moments, Rolling
 from contourslam.simulation.room import Room
+from contourslam.simulation.senses import Eyes, Message, Past, Senses
 from contourslam.simulation.traffic import Traffic
 from contourslam.simulation.world import TIMESTEP
 
 Floats = NDArray[np.float64]
-Message = LaserScan | Odometry | TruePose
-Turn = tuple[float, Floats, Floats]
 DURATION = 180.0
 """Length of a drive of several robots where none is asked for, s."""
 _SLOWEST = 0.8  # of the speed asked for, at which a robot goes
@@ -65,7 +56,7 @@ class SeveralRobots:
     Raises
     ------
     ConfigError
-        If so many robots do not fit; the message says how many do.
+        If there is no robot, or so many do not fit; the message says how many do.
     """
 
     def __init__(
@@ -77,6 +68,8 @@ class SeveralRobots:
         *,
         contact_free: bool = False,
     ) -> None:
+        if robots < 1:
+            raise ConfigError(f"there must be at least one robot, got {robots}")
         self.room = place if isinstance(place, Room) else place.room
         self.config, self.seeds = config, [seed_of(seed, robot) for robot in range(robots)]
         self.duration = DURATION if config.duration is None else config.duration
@@ -85,7 +78,7 @@ class SeveralRobots:
         self._speeds: list[float] = speeds.tolist()
         self.ways, self._firsts = ways_of(place, robots, 1.2 * config.speed * self.duration + 10.0, seed)
         self.starts = [start for _, start in self.drivers()]
-        self._contact_free = contact_free
+        self.contact_free = contact_free
 
     def drivers(self) -> list[tuple[Follower, tuple[float, float, float]]]:
         """Give each robot a new driver, at its start."""
@@ -120,66 +113,37 @@ class SeveralRobots:
         ConfigError
             If a robot gets stuck.
         """
-        config, room = self.config, self.room
-        world: Rolling | Gliding
-        if self._contact_free:
-            world = Gliding(config.robot, self.seeds, self.starts)
-        else:
-            world = Rolling(room, config.robot, self.seeds, self.starts)
-        helm, past = _Helm(self), Past(world.begun, world.spacing)
-        eyes = _Eyes(room, config, contact_free=self._contact_free)
+        eyes = Eyes(self.room, self.config, contact_free=self.contact_free)
         ticks = _ticks(self.duration)
-        senses = [_Senses(robot, seed, config, eyes, ticks * TICK) for robot, seed in enumerate(self.seeds)]
+        senses = [Senses(robot, seed, self.config, eyes, ticks * TICK) for robot, seed in enumerate(self.seeds)]
+        moments = self.moments()
+        past = Past(next(moments), (Gliding if self.contact_free else Rolling).spacing)
         for tick in range(ticks + 1):
             if tick < ticks:  # one tick ahead: what is between two moments needs both
-                past.add(world.step(helm.steer(past.latest, tick)))
+                past.add(next(moments))
             now = round(tick * TICK, 9)
             for robot, sense in enumerate(senses):
                 for message in sense.tick(now, past):
                     yield robot, message
             past.forget(min(sense.oldest for sense in senses))
 
+    def moments(self) -> Iterator[Moments]:
+        """Drive without looking around: the truth alone, at 0 s and then tick by tick. Errors as :meth:`messages`."""
+        world: Rolling | Gliding
+        if self.contact_free:
+            world = Gliding(self.config.robot, self.seeds, self.starts)
+        else:
+            world = Rolling(self.room, self.config.robot, self.seeds, self.starts)
+        helm, latest = _Helm(self), world.begun
+        yield latest
+        for tick in range(_ticks(self.duration)):
+            latest = world.step(helm.steer(latest, tick))
+            yield latest
+
 
 def _ticks(duration: float) -> int:
     """How many ticks a drive of one robot of this length (s) has."""
     return max(math.ceil((duration - TIMESTEP / 2) / TICK - 1e-9), 0)
-
-
-class Past:
-    """The last moments of all robots. Mutable.
-
-    Attributes
-    ----------
-    latest : Moments
-        Those that were added last.
-    """
-
-    def __init__(self, begun: Moments, spacing: float) -> None:
-        self.latest, self._spacing, self._first = begun, spacing, 0
-        self._parts = deque([begun])
-        self._whole: Moments | None = None
-
-    def add(self, moments: Moments) -> None:
-        """Remember what came next."""
-        self.latest, self._whole = moments, None
-        self._parts.append(moments)
-
-    def forget(self, stamp: float) -> None:
-        """Forget what is older than a stamp, s, and not needed for what was then."""
-        while len(self._parts) > 2 and (self._first + len(self._parts[0].poses)) * self._spacing < stamp:
-            self._first += len(self._parts.popleft().poses)
-            self._whole = None
-
-    @property
-    def moments(self) -> Moments:
-        """All that is remembered."""
-        if self._whole is None:
-            self._whole = Moments.joined(self._parts)
-        return self._whole
-
-    def drive(self, robot: int) -> Drive:
-        """The remembered part of the drive of one robot."""
-        return drive_of(self.moments, robot, spacing=self._spacing, first=self._first)
 
 
 class _Helm:
@@ -208,73 +172,3 @@ class _Helm:
             driver.steer(moments.last_pose(robot), time, TICK, limit)
             for robot, (driver, limit) in enumerate(zip(self._drivers, limits, strict=True))
         ]
-
-
-class _Eyes:
-    """What beams meet: the room, and the robots in it."""
-
-    def __init__(self, room: Room, config: SimulationConfig, *, contact_free: bool) -> None:
-        self._lidar = config.lidar
-        self._parts = drums(config.robot)
-        self._plane = PlaneCaster(*outlines(room, config.lidar.mount_height)) if contact_free else None
-        self._solid = None if contact_free else SolidCaster(room)
-
-    def look(self, past: Past, robot: int, mount_z: float, times: Floats, angles: Floats) -> tuple[Floats, Floats]:
-        """Ranges (m) and incidences (rad) of the beams of one robot."""
-        drive = past.drive(robot)
-        origins, directions = beams(drive, self._lidar, mount_z, times, angles)
-        if self._solid is not None:
-            found = self._solid.cast(origins, directions)
-        else:
-            assert self._plane is not None
-            bearings = np.arctan2(directions[:, 1], directions[:, 0])
-            found = self._plane.cast(origins[:, :2].copy(), bearings, self._lidar.range_max)
-        if past.moments.poses.shape[1] == 1:
-            return found
-        steps, weights = drive.between(times)
-        moments = past.moments
-        others = cast_others(
-            origins, directions, steps, weights, moments.positions, moments.rotations, self._parts, robot
-        )
-        nearer = others[0] < found[0]
-        return np.where(nearer, others[0], found[0]), np.where(nearer, others[1], found[1])
-
-
-class _Senses:
-    """Encoders and lidar of one robot, and the messages that they send. Mutable.
-
-    Attributes
-    ----------
-    oldest : float
-        Stamp of the oldest moment that is still needed, s.
-    """
-
-    def __init__(self, robot: int, seed: int, config: SimulationConfig, eyes: _Eyes, end: float) -> None:
-        self._robot, self._config, self._eyes, self._end = robot, config, eyes, end
-        self._lidar = config.measuring_lidar
-        self._encoders, self._noise = Encoders(config.robot, seed), stream(seed, NOISE)
-        self._turns, self._begun = turns(config.lidar, seed), deque[Turn]()
-        self._next: Turn = next(self._turns)
-        self._mount_z = math.nan
-        self.oldest = 0.0
-
-    def tick(self, now: float, past: Past) -> Iterator[Message]:
-        """All messages until now (s) since the last call."""
-        drive = past.drive(self._robot)
-        if now == 0.0:
-            self._mount_z = self._lidar.mount_height - float(drive.positions[0, 2])
-        stamps = {now}
-        while self._next[0] <= now:
-            if self._next[0] + self._next[1][-1] <= self._end:
-                stamps.add(self._next[0])
-                self._begun.append(self._next)
-            self._next = next(self._turns)
-        wanted = np.array(sorted(stamps))
-        for stamp, pose in zip(wanted.tolist(), drive.truth(wanted), strict=True):
-            yield TruePose(stamp, pose)
-        yield Odometry(now, self._encoders.read(drive.wheel_angles[drive.row(now)].tolist())[0])
-        while self._begun and round(self._begun[0][0] + float(self._begun[0][1][-1]), 9) <= now:
-            stamp, offsets, angles = self._begun.popleft()
-            ranges, incidences = self._eyes.look(past, self._robot, self._mount_z, stamp + offsets, angles)
-            yield measure(IdealScan(stamp, angles, offsets, ranges, incidences), self._lidar, self._noise)
-        self.oldest = self._begun[0][0] if self._begun else now
