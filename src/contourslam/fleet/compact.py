@@ -23,7 +23,7 @@ LONG = 40
 HALF, LIKELY, GUESSED = 1 << 15, 61440, 4  # what is guessed of the sizes counts as much as so many decisions
 DENSEST = 710  # numbers a byte that there can be: each takes a decision, and that costs 0.011 bits at least
 SPARED = 4  # zeros at the end that are left out
-MOST_THINGS = 300_000  # of which one message may speak
+MOST_THINGS = 100_000  # of which one message may speak
 
 
 @kernel

@@ -1,14 +1,15 @@
 """What the server has acknowledged, on the disk: a file for each run, to which reports are only ever added."""
 
+import contextlib
 import os
 import struct
 import zlib
 from collections.abc import Iterator
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from contourslam.atomic import make_folder
-from contourslam.errors import JournalError, MessageError
+from contourslam.errors import JournalError, MessageError, ResultError
 from contourslam.fleet.facts import Report
 from contourslam.fleet.wire import LONGEST, decode
 
@@ -42,8 +43,7 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self.path, self.trouble = path, ""
-        self._file: BinaryIO | None = None
-        self._end = 0  # of what is whole
+        self._end, self._settled = 0, True  # where what is whole ends; whether the disk surely has it
         if path.exists():
             self._end = self._sound()
 
@@ -75,52 +75,41 @@ class Journal:
             If it cannot be written, as on a full disk; then the file is as it was.
         """
         record = RECORD.pack(len(report), zlib.crc32(report)) + report
+        beginning = b"" if self._end else BEGINNING
         try:
-            file = self._opened()
-            file.write(record)
-            file.flush()
-        except OSError as error:
+            make_folder(self.path.parent)
+            with self.path.open("ab", buffering=0) as file:
+                _write(file, beginning + record)
+        except (OSError, ResultError) as error:
             self._cut()
+            reason = getattr(error, "strerror", None) or error
             raise JournalError(
-                f"{self.path}: cannot be written ({error.strerror or error}); free space, nothing more is acknowledged"
+                f"{self.path}: cannot be written ({reason}); free space, nothing more is acknowledged until then"
             ) from error
-        self._end += len(record)
+        self._end += len(beginning) + len(record)
+        self._settled = False
 
     def settle(self) -> None:
-        """Wait until the disk has everything, and let go of the file until the next report.
+        """Wait until the disk has everything.
 
         Raises
         ------
         JournalError
             If the disk fails.
         """
-        file, self._file = self._file, None
-        if file is None:
+        if self._settled:
             return
         try:
-            with file:
+            with self.path.open("rb") as file:
                 os.fsync(file.fileno())
         except OSError as error:
             raise JournalError(f"{self.path}: the disk fails ({error.strerror or error}); do not trust it") from error
-
-    def _opened(self) -> BinaryIO:
-        if self._file is None:
-            make_folder(self.path.parent)
-            self._file = self.path.open("ab", buffering=0)
-            if self._end == 0:
-                self._file.write(BEGINNING)
-                self._end = len(BEGINNING)
-        return self._file
+        self._settled = True
 
     def _cut(self) -> None:
-        """Take back what was written by half."""
-        file, self._file = self._file, None
-        try:
-            if file is not None:
-                file.close()
+        """Take back what was written by half; where that fails too, the next one to open the file does it."""
+        with contextlib.suppress(OSError):
             os.truncate(self.path, self._end)
-        except OSError as error:
-            self.trouble = f"{self.path}: half a report cannot be cut off ({error.strerror or error}); start anew"
 
     def _sound(self) -> int:
         """Find where the last whole record ends, and cut off what comes after it."""
@@ -154,6 +143,12 @@ class Journal:
             f"{self.path}: the last {size - end} bytes are no whole report, as after a crash; they are in "
             f"{beside.name} now, and the robot is asked for what is missing"
         )
+
+
+def _write(file: FileIO, data: bytes) -> None:
+    """Write all of it: a disk that fills up takes a part first, and says so only then."""
+    while data:
+        data = data[file.write(data) :]
 
 
 def journals(folder: Path) -> Iterator[Path]:

@@ -86,7 +86,7 @@ class Reporter:
     """
 
     def __init__(
-        self, robot: str, run: Callable[[], int] = draw_run, *, period: float = 1.0, rate: float = 2000.0
+        self, robot: str, run: Callable[[], int] = draw_run, *, period: float = 1.0, rate: float = 4000.0
     ) -> None:
         self.robot = check_name(robot)
         self._draw, self._period = run, period
@@ -98,7 +98,6 @@ class Reporter:
         self._outbox: Outbox | None = None
         self._former: list[Outbox] = []
         self._allowance = Allowance(rate)
-        self._status: Status | None = None
         self._status_at = -math.inf
         self._answer: Answer | None = None
         self._placed: Placed | None = None
@@ -113,15 +112,13 @@ class Reporter:
     def waiting(self) -> int:
         """Reports that the server has not said to have."""
         with self._lock:
-            boxes = [*self._former, *([] if self._outbox is None else [self._outbox])]
-            return sum(max(len(box.reports) - box.received, 0) for box in boxes)
+            return sum(max(len(box.reports) - box.received, 0) for box in self._boxes())
 
     @property
     def settled(self) -> bool:
         """Whether the server has said that it has everything that there is to tell."""
         with self._lock:
-            boxes = [*self._former, *([] if self._outbox is None else [self._outbox])]
-            return not self._facts and all(box.settled for box in boxes)
+            return not self._facts and all(box.settled for box in self._boxes())
 
     def push(self, slam: GraphSlam, update: ScanUpdate, now: float) -> None:
         """Take in what a scan has added to the graph.
@@ -162,11 +159,15 @@ class Reporter:
             self._allowance.renew(now)
             out: list[bytes] = []
             self._former = [box for box in self._former if not box.settled][-FORMER:]
-            for box in (*self._former, *([] if self._outbox is None else [self._outbox])):
+            boxes = self._boxes()
+            for box in boxes:
                 out += box.due(now, self._allowance)
-            if self._status is not None and now >= self._status_at + self._period:
+            if now >= self._status_at + self._period:
                 self._status_at = now
-                out += [encode(status) for status in self._statuses()]
+                for news in (box.news() for box in boxes):
+                    if news is not None:
+                        self._allowance.spend(len(news))
+                        out.append(news)
             return out
 
     def answered(self, answer: Answer) -> None:
@@ -174,7 +175,7 @@ class Reporter:
         if answer.robot != self.robot:
             return
         with self._lock:
-            for box in (*self._former, *([] if self._outbox is None else [self._outbox])):
+            for box in self._boxes():
                 if box.run == answer.run:
                     box.answered(answer)
             if self._outbox is not None and answer.run == self._outbox.run:
@@ -185,13 +186,9 @@ class Reporter:
         with self._lock:
             return self._placed
 
-    def _statuses(self) -> list[Status]:
-        """That of this run, and those of runs before it of which the server may miss something."""
-        status = self._status
-        if status is None or self._outbox is None:
-            return []
-        former = [Status(self.robot, box.run, len(box.reports), -1, np.zeros(3), status.stamp) for box in self._former]
-        return [*former, status]
+    def _boxes(self) -> list[Outbox]:
+        """Runs before this one of which the server misses something, and this one."""
+        return [*self._former, *([] if self._outbox is None else [self._outbox])]
 
     def _take_up(self, slam: GraphSlam) -> News:
         """Go on with another graph."""
@@ -223,7 +220,7 @@ class Reporter:
         with self._lock:
             outbox, answer = self._outbox, self._answer
             if outbox is not None:
-                self._status = Status(self.robot, outbox.run, len(outbox.reports), keyframe, seen, update.stamp)
+                outbox.status = Status(self.robot, outbox.run, len(outbox.reports), keyframe, seen, update.stamp)
         placed = None
         if answer is not None and 0 <= answer.keyframe < len(news.poses):
             placed = _place(update, answer, news)

@@ -1,8 +1,10 @@
 """What a robot has told of one run: kept so that it can be told again, and sent no faster than it may be."""
 
 import math
+from dataclasses import replace
 
-from contourslam.fleet.facts import Answer
+from contourslam.fleet.facts import Answer, Status
+from contourslam.fleet.wire import encode
 
 WINDOW = 64  # reports that are sent beyond what the server has said that it has
 PATIENCE = 2.0  # s after which a report that the server misses is sent again
@@ -30,12 +32,14 @@ class Allowance:
             self._left = min(self._left + self._rate * (now - self._at), self._most)
             self._at = now
 
-    def spend(self, size: int) -> bool:
-        """Take a message's bytes, where any are left; a long one is paid off afterwards."""
-        if self._left <= 0.0:
-            return False
+    @property
+    def left(self) -> bool:
+        """Whether anything may be sent; what a long message takes too much is paid off afterwards."""
+        return self._left > 0.0
+
+    def spend(self, size: int) -> None:
+        """Take a message's bytes."""
         self._left -= size + OVERHEAD
-        return True
 
 
 class Outbox:
@@ -48,12 +52,15 @@ class Outbox:
         All, by their numbers.
     received : int
         As many the server has, as far as it said.
+    status : Status or None
+        Where the robot was last in this run.
     """
 
     def __init__(self, run: int) -> None:
         self.run = run
         self.reports: list[bytes] = []
         self.received = 0
+        self.status: Status | None = None
         self._sent: list[float] = []  # when each was sent last
         self._missing: tuple[int, ...] = ()
 
@@ -71,6 +78,10 @@ class Outbox:
         """Take in what the server has and misses; what it has lost it gets again."""
         self.received, self._missing = answer.received, answer.missing
 
+    def news(self) -> bytes | None:
+        """Give a status: by it the server sees what it misses, though no other report may come."""
+        return None if self.status is None else encode(replace(self.status, reports=len(self.reports)))
+
     def due(self, now: float, allowance: Allowance) -> list[bytes]:
         """Give the reports to be sent now, oldest first: those that the server misses, and those never sent."""
         out = []
@@ -78,8 +89,9 @@ class Outbox:
         until = min(self.received + WINDOW, len(self.reports))
         new = [n for n in range(self.received, until) if self._sent[n] == -math.inf and n not in again]
         for number in sorted(again + new):
-            if not allowance.spend(len(self.reports[number])):
+            if not allowance.left:
                 break
+            allowance.spend(len(self.reports[number]))
             self._sent[number] = now
             out.append(self.reports[number])
         return out

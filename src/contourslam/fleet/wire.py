@@ -16,7 +16,6 @@ from contourslam.fleet.compact import Reader, Writer
 from contourslam.fleet.facts import Answer, Report, Status
 from contourslam.fleet.wire_facts import (
     APART,
-    CONTEXTS,
     SIZES,
     STAMP,
     TURN,
@@ -36,11 +35,13 @@ MAGIC, VERSION = b"CF", 1
 HEAD = struct.Struct("<2sBcI")  # magic, version, kind, checksum of all that follows
 LONGEST = 1 << 20  # bytes of one message
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-RUN_BITS, STAMP_BITS = 63, 56
-MOST_MISSING, MOST_ROBOTS, MOST_NUMBER = 1000, 1000, (1 << 40) - 1
+RUN_BITS, STAMP_BITS, NUMBER_BITS = 63, 56, 40
+MOST_MISSING, MOST_ROBOTS = 1000, 1000
 
-_NUMBER, _KEYFRAME, _POSE, _MATRIX, _MISSING, _ROBOTS = (CONTEXTS + n for n in (0, 1, 2, 5, 11, 12))
-_SIZES = np.array([*SIZES, 8, 8, 12, 12, 12, 11, 11, 11, 4, 4, 4, 2, 2])
+# Contexts of statuses and answers, and about how many bits their numbers have.
+_NUMBER, _KEYFRAME, _POSE, _MATRIX, _MISSING, _ROBOTS = 0, 1, 2, 5, 11, 12
+_SMALL = np.array([8, 8, 12, 12, 12, 11, 11, 11, 4, 4, 4, 2, 2])
+_LARGE = np.array(SIZES)
 
 
 def check_name(robot: str) -> str:
@@ -66,10 +67,11 @@ def encode(message: Message) -> bytes:
     MessageError
         If it holds what cannot be sent: a name that is none, numbers that are not finite, too much for one message.
     """
-    writer = Writer(_SIZES)
+    writer = Writer(_LARGE if isinstance(message, Report) else _SMALL)
     if isinstance(message, Report):
         kind = b"R"
-        _put_number(writer, message.number)
+        _check_number(message.number)
+        writer.put(-NUMBER_BITS, message.number)
         put_facts(writer, message.facts)
     elif isinstance(message, Status):
         kind = b"S"
@@ -110,7 +112,7 @@ def decode(data: bytes) -> Message:
     robot, run = body[1:until].decode("latin-1"), int.from_bytes(body[until : until + 8], "little")
     if len(body) < until + 8 or run >> RUN_BITS or NAME.fullmatch(robot) is None:
         raise MessageError("a message of nobody: its name or run is none; it is damaged or foreign")
-    reader = Reader(body[until + 8 :], _SIZES)
+    reader = Reader(body[until + 8 :], _LARGE if kind == b"R" else _SMALL)
     readers: dict[bytes, Callable[[Reader, str, int], Message]]
     readers = {b"R": _take_report, b"S": _take_status, b"A": _take_answer}
     if kind not in readers:
@@ -125,21 +127,25 @@ def checksum(data: bytes) -> int:
     return int(HEAD.unpack_from(data)[3])
 
 
-def _put_number(writer: Writer, value: int, *, least: int = 0) -> None:
-    if not least <= value <= MOST_NUMBER:
+def _check_number(value: int, least: int = 0) -> None:
+    if not least <= value < 1 << NUMBER_BITS:
         raise MessageError(f"{value} cannot be sent as a number of something")
+
+
+def _put_number(writer: Writer, value: int, *, least: int = 0) -> None:
+    _check_number(value, least)
     writer.put(_NUMBER, value - least)
 
 
 def _take_number(reader: Reader, *, least: int = 0) -> int:
     value = reader.take(_NUMBER) + least
-    if not least <= value <= MOST_NUMBER:
+    if not least <= value < 1 << NUMBER_BITS:
         raise MessageError(f"it speaks of number {value}; it is damaged or foreign")
     return value
 
 
 def _take_report(reader: Reader, robot: str, run: int) -> Report:
-    return Report(robot, run, _take_number(reader), take_facts(reader))
+    return Report(robot, run, reader.take(-NUMBER_BITS), take_facts(reader))
 
 
 def _put_status(writer: Writer, status: Status) -> None:
@@ -158,9 +164,9 @@ def _take_status(reader: Reader, robot: str, run: int) -> Status:
 
 
 def _put_answer(writer: Writer, answer: Answer) -> None:
-    for number in (answer.received, answer.common):
-        _put_number(writer, number)
-    _put_number(writer, answer.keyframe, least=-1)
+    _put_number(writer, answer.received)
+    for number in (answer.common, answer.keyframe):
+        _put_number(writer, number, least=-1)
     writer.count(_MISSING, len(answer.missing), MOST_MISSING)
     last = answer.received
     for number in answer.missing:
@@ -177,7 +183,7 @@ def _put_answer(writer: Writer, answer: Answer) -> None:
 
 
 def _take_answer(reader: Reader, robot: str, run: int) -> Answer:
-    received, common, keyframe = _take_number(reader), _take_number(reader), _take_number(reader, least=-1)
+    received, common, keyframe = _take_number(reader), _take_number(reader, least=-1), _take_number(reader, least=-1)
     missing, last = [], received
     for _ in range(reader.count(_MISSING, MOST_MISSING)):
         last = bounded(last + reader.take(_MISSING))

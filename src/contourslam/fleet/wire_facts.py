@@ -18,7 +18,7 @@ PLACE, HEADING = 0.001, 1e-4  # of a keyframe's pose, m and rad: where the serve
 APART, TURN = 1e-4, 5e-5  # of relative poses, m and rad: no match is surer than 1 mm and 0.02 degrees
 STAMP = 1e-6  # s
 OCTAVE, LEAST_VARIANCE = 8, 1e-12  # steps a doubling of variances, and the least that is not taken for none
-ROOTS, LEAST_ROOT, LEAN = 32, 1e-9, 16  # the same of roots of matrices; steps of their other numbers
+ROOTS, LEAST_ROOT, LEAN = 32, 1e-9, 32  # the same of roots of matrices; steps of their other numbers
 CORRELATION = 16
 KERNEL = 1e-3  # of a robust kernel's width
 POINT, DIRECTION, LENGTH = 0.005, 2.0 * math.pi / 1024, 0.02  # of sightings: m, rad, m
@@ -146,10 +146,17 @@ def put_matrix(writer: Writer, context: int, matrix: Floats, before: Ints) -> No
     own = [_size(size) for size in sizes]
     for i in range(3):
         writer.put(context + i, sizes[i] - int(before[i]))
+    # (I + E) R is told in place of R: what one number is off goes on along its row, and the next ones make up for it;
+    # so every part of E is small, however much R slants.
+    off = np.zeros((3, 3))
     for n, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
-        # In steps of what the other direction has of its own, else of the first one's: so it is kept where it is small.
-        scale = own[j] or own[i]
-        writer.put(context + 3 + n, round(LEAN * float(root[i, j]) / scale) if own[i] else 0)
+        scale, step = (own[j] or own[i]) / LEAN, 0
+        if own[i]:
+            off[i, i] = own[i] / root[i, i] - 1.0
+            wanted = float(root[i, j] + off[i, i:j] @ root[i:j, j])
+            step = round(wanted / scale)
+            off[i, j] = (step * scale - wanted) / root[j, j] if own[j] else 0.0
+        writer.put(context + 3 + n, step)
     before[:] = sizes
 
 

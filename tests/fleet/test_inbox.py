@@ -1,0 +1,243 @@
+"""Whatever the air and crashes do to messages, the server ends up with just what was told, each once and in order."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import Bundle, RuleBasedStateMachine, invariant, precondition, rule
+
+from contourslam.errors import JournalError, MessageError
+from contourslam.fleet.facts import Answer, KeyframeFact, Report, Status
+from contourslam.fleet.inbox import AHEAD, AHEAD_BYTES, Inbox
+from contourslam.fleet.journal import Journal
+from contourslam.fleet.reporter_outbox import PATIENCE, Allowance, Outbox
+from contourslam.fleet.wire import encode
+
+ROBOT = "robot1"
+
+
+def fact(number: int, stamp: float = 0.0, points: int = 1) -> KeyframeFact:
+    empty = np.zeros((0, 13), np.float32)
+    return KeyframeFact(number, stamp, np.zeros(3), 0.0, np.ones((points, 4), np.float32), empty)
+
+
+def report(number: int, run: int = 1, *, robot: str = ROBOT, stamp: float = 0.0, points: int = 1) -> bytes:
+    return encode(Report(robot, run, number, (fact(number, stamp, points),)))
+
+
+def status(reports: int, run: int = 1, *, robot: str = ROBOT, stamp: float = 0.0) -> bytes:
+    return encode(Status(robot, run, reports, -1, np.zeros(3), stamp))
+
+
+def numbers(inbox: Inbox, *messages: bytes) -> list[int]:
+    return [told.number for data in messages for told in inbox.take(data).reports]
+
+
+class Fleet(RuleBasedStateMachine):
+    """Two robots that tell, an air that loses, repeats and mixes, a server; robots and server may die at any time."""
+
+    air = Bundle("air")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.folder = Path(tempfile.mkdtemp())
+        self.now = 0.0
+        self.robots = {name: [Outbox(100 + 10 * i)] for i, name in enumerate(("a", "b"))}
+        self.inbox, self.got = Inbox(self.folder), dict[tuple[str, int], list[bytes]]()
+        self.acknowledged: dict[tuple[str, int], int] = {}
+
+    def teardown(self) -> None:
+        shutil.rmtree(self.folder)
+
+    @rule(name=st.sampled_from("ab"), points=st.integers(0, 3))
+    def tell(self, name: str, points: int) -> None:
+        box = self.robots[name][-1]
+        number = len(box.reports)
+        box.add(report(number, box.run, robot=name, points=points))
+
+    @rule(name=st.sampled_from("ab"))
+    def restart(self, name: str) -> None:
+        """The program dies: what it had not sent for sure is lost with it; the next run is another one."""
+        self.robots[name].append(Outbox(self.robots[name][-1].run + 1))
+
+    @rule(target=air, name=st.sampled_from("ab"), wait=st.sampled_from([0.1, PATIENCE]))
+    def send(self, name: str, wait: float) -> list[bytes]:
+        self.now += wait
+        allowance, box = Allowance(1e9), self.robots[name][-1]
+        allowance.renew(self.now)
+        return [*box.due(self.now, allowance), status(len(box.reports), box.run, robot=name)]
+
+    @rule(sent=air, order=st.randoms(use_true_random=False), part=st.floats(0.0, 1.0))
+    def arrive(self, sent: list[bytes], order: object, part: float) -> None:
+        """Some of what was sent comes, perhaps again, perhaps late, in any order."""
+        chosen = [data for data in sent if order.random() < part]  # type: ignore[attr-defined]
+        order.shuffle(chosen)  # type: ignore[attr-defined]
+        for data in chosen:
+            self.take(data)
+
+    @rule(sent=air, at=st.integers(0, 10**6))
+    def arrive_damaged(self, sent: list[bytes], at: int) -> None:
+        wrong = bytearray(sent[at % len(sent)])
+        wrong[at % len(wrong)] ^= 1
+        with pytest.raises(MessageError):
+            self.inbox.take(bytes(wrong))
+
+    @rule(name=st.sampled_from("ab"))
+    def answer(self, name: str) -> None:
+        box = self.robots[name][-1]
+        self.inbox.settle()
+        told = self.inbox.amend(Answer(name, box.run, 0, (), 0, (), -1, np.zeros(3), np.eye(3)))
+        box.answered(told)
+        self.acknowledged[name, box.run] = told.received
+
+    @rule(torn=st.integers(0, 30))
+    def crash(self, torn: int) -> None:
+        """The server dies, in the middle of writing a record; what it had acknowledged is there for the next one."""
+        for path in self.folder.glob("*.facts"):
+            with path.open("ab") as file:
+                file.write(bytes(torn))
+        self.inbox = Inbox(self.folder)
+        assert bool(self.inbox.troubles) == bool(torn and list(self.folder.glob("*.facts")))
+        self.got = {}
+        for told in self.inbox.kept():
+            self.got.setdefault((told.robot, told.run), []).append(encode(told))
+        for source, received in self.acknowledged.items():
+            assert len(self.got.get(source, [])) >= received
+
+    def take(self, data: bytes) -> None:
+        taken = self.inbox.take(data)
+        assert taken.fault == ""
+        for told in taken.reports:
+            self.got.setdefault(taken.source, []).append(encode(told))
+
+    @invariant()
+    def all_that_was_got_is_what_was_told_in_order(self) -> None:
+        for name, boxes in self.robots.items():
+            for box in boxes:
+                got = self.got.get((name, box.run), [])
+                assert got == box.reports[: len(got)]
+
+    @precondition(lambda self: any(boxes[-1].reports for boxes in self.robots.values()))
+    @rule()
+    def once_the_air_is_good_all_is_there(self) -> None:
+        for name, boxes in self.robots.items():
+            box, rounds = boxes[-1], 0
+            while not box.settled or len(self.got.get((name, box.run), [])) < len(box.reports):
+                rounds += 1
+                assert rounds < 10
+                for data in self.send(name, PATIENCE):
+                    self.take(data)
+                self.answer(name)
+            assert self.got.get((name, box.run), []) == box.reports
+
+
+Fleet.TestCase.settings = settings(max_examples=25, stateful_step_count=25, deadline=None)
+TestNothingIsLostAndNothingIsDoubled = Fleet.TestCase
+
+
+def test_what_comes_after_a_gap_waits_for_it_and_is_not_acknowledged() -> None:
+    inbox = Inbox()
+    assert numbers(inbox, report(0), report(2), report(3)) == [0]
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (1, (1,))
+    assert numbers(inbox, report(1)) == [1, 2, 3]
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (4, ())
+
+
+def test_a_repeated_report_gives_nothing_new() -> None:
+    inbox = Inbox()
+    assert numbers(inbox, report(0), report(0), report(2), report(2), report(1), report(1), report(2)) == [0, 1, 2]
+
+
+def test_a_status_says_that_the_last_reports_are_missing() -> None:
+    inbox = Inbox()
+    inbox.take(report(0))
+    inbox.take(status(4))
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (1, (1, 2, 3))
+
+
+def test_only_what_is_on_the_disk_is_acknowledged(tmp_path: Path) -> None:
+    inbox = Inbox(tmp_path)
+    inbox.take(report(0))
+    assert inbox.state((ROBOT, 1))[0] == 0
+    inbox.settle()
+    assert inbox.state((ROBOT, 1))[0] == 1
+
+
+def test_a_report_that_cannot_be_kept_is_not_taken_and_is_taken_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(journal: Journal, data: bytes) -> None:
+        raise JournalError("full")
+
+    inbox = Inbox(tmp_path)
+    inbox.take(report(0))
+    monkeypatch.setattr(Journal, "add", full)
+    with pytest.raises(JournalError):
+        inbox.take(report(1))
+    inbox.take(report(2))
+    monkeypatch.undo()
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (1, (1,))
+    assert numbers(inbox, report(1)) == [1, 2]
+    assert [told.number for told in Inbox(tmp_path).kept()] == [0, 1, 2]
+
+
+def test_another_content_under_the_same_number_is_a_fault_and_the_first_is_kept() -> None:
+    inbox = Inbox()
+    inbox.take(report(0))
+    inbox.take(report(2))
+    for number in (0, 2):
+        taken = inbox.take(report(number, stamp=5.0))
+        assert taken.reports == ()
+        assert "two robots have this name" in taken.fault
+    told = inbox.take(report(1)).reports
+    assert [encode(each) for each in told] == [report(1), report(2)]
+
+
+def test_two_robots_of_one_name_that_drive_at_once_are_told_of() -> None:
+    inbox = Inbox()
+    faults = [inbox.take(report(number, run, stamp=10.0 + number)).fault for number in range(6) for run in (1, 2)]
+    assert any("two drives at once" in fault for fault in faults)
+
+
+def test_what_a_robot_told_before_its_restart_may_come_after_it() -> None:
+    inbox = Inbox()
+    inbox.take(report(0, 2, stamp=100.0))
+    assert [inbox.take(report(number, 1, stamp=50.0 + number)).fault for number in range(9)] == [""] * 9
+
+
+def test_beyond_a_gap_only_so_much_is_held() -> None:
+    inbox = Inbox()
+    for number in range(1, 2 * AHEAD):
+        inbox.take(report(number))
+    assert numbers(inbox, report(0)) == list(range(AHEAD))
+
+
+def test_beyond_a_gap_only_so_many_bytes_are_held() -> None:
+    points = np.random.default_rng(0).normal(size=(15_000, 4)).astype(np.float32)
+    large = KeyframeFact(0, 0.0, np.zeros(3), 0.0, points, np.zeros((0, 13), np.float32))
+    messages = [encode(Report(ROBOT, 1, number, (large,))) for number in range(1, 40)]
+    room = AHEAD_BYTES // len(messages[0])
+    assert room < len(messages) - 2
+    inbox = Inbox()
+    assert numbers(inbox, *messages) == []
+    assert room - 2 <= len(numbers(inbox, report(0))) <= room + 2
+
+
+def test_answers_are_none_of_the_inbox() -> None:
+    answer = Answer(ROBOT, 1, 0, (), 0, (), -1, np.zeros(3), np.eye(3))
+    assert "only a server sends" in Inbox().take(encode(answer)).fault
+
+
+def test_a_file_whose_reports_are_not_in_their_places_is_refused(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "x.facts")
+    journal.add(report(1))
+    with pytest.raises(JournalError, match="not in its place"):
+        Inbox(tmp_path)
