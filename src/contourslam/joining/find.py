@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
 from contourslam.geometry.angles import wrap
-from contourslam.geometry.poses import between_one, compose_one, inverse, transform
+from contourslam.geometry.poses import between, between_one, compose, compose_one, inverse, transform
 from contourslam.joining.chart import Chart
 from contourslam.joining.joint import Apart, Evidence, Joint, Tie
 from contourslam.joining.laying import Laid, lay, thinned
@@ -111,18 +112,31 @@ def _decided(first: Chart, second: Chart, looks: list[Look]) -> Joint | Apart:
 
 def _groups(second: Chart, looks: list[Look]) -> list[list[Look]]:
     """Looks that agree, those first of which most speaks for; each look is in one group."""
-    rest = sorted((each for each in looks if each.odds > LIKELY), key=lambda each: (-each.odds, each.view, each.back))
-    groups: list[list[Look]] = []
-    while rest:
-        group = [rest.pop(0)]
-        grown = True
-        while grown:
-            agreeing = [each for each in rest if any(_agree(second, each, other) for other in group)]
-            rest = [each for each in rest if not any(each is other for other in agreeing)]
-            group += agreeing
-            grown = bool(agreeing)
-        groups.append(group)
+    likely = sorted((each for each in looks if each.odds > LIKELY), key=lambda each: (-each.odds, each.view, each.back))
+    if not likely:
+        return []
+    own = second.frames.poses[[each.keyframe for each in likely]]
+    there = np.array([each.pose for each in likely])
+    free, groups = np.ones(len(likely), np.bool_), list[list[Look]]()
+    while free.any():
+        waiting, group = [int(np.argmax(free))], list[int]()
+        free[waiting[0]] = False
+        while waiting:
+            group.append(waiting.pop(0))
+            new = np.flatnonzero(free)
+            new = new[_agree(own[group[-1]], there[group[-1]], own[new], there[new])]
+            free[new] = False
+            waiting += new.tolist()
+        groups.append([likely[k] for k in group])
     return sorted(groups, key=lambda group: -_support(group))
+
+
+def _agree(own: Floats, there: Floats, others: Floats, others_there: Floats) -> NDArray[np.bool_]:
+    """Whether a look, a keyframe and where it may lie, agrees with others: by what the map may be bent between them."""
+    way = between(own, others)
+    off = between(compose(there, way), others_there)
+    near = np.hypot(off[:, 0], off[:, 1]) < AGREE + DRIFT * np.hypot(way[:, 0], way[:, 1])
+    return np.asarray(near & (np.abs(off[:, 2]) < AGREE_ANGLE))
 
 
 def _support(group: list[Look]) -> float:
@@ -131,13 +145,6 @@ def _support(group: list[Look]) -> float:
     for each in group:
         views[each.view, each.back] = max(views.get((each.view, each.back), -math.inf), each.odds - LIKELY)
     return sum(views.values())
-
-
-def _agree(second: Chart, one: Look, other: Look) -> bool:
-    own = between_one(second.frames.poses[one.keyframe], second.frames.poses[other.keyframe])
-    off = between_one(compose_one(one.pose, own), other.pose)
-    near = math.hypot(off[0], off[1]) < AGREE + DRIFT * math.hypot(own[0], own[1])
-    return near and abs(off[2]) < AGREE_ANGLE
 
 
 def _in(hypothesis: _Hypothesis, new: Look, second: Chart) -> bool:
