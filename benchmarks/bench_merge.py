@@ -60,7 +60,7 @@ def cut(messages: Sequence[Message], parts: int) -> list[list[Message]]:
     stamps = np.array([message.stamp for message in messages])
     edges = np.linspace(stamps.min(), stamps.max(), parts + 1)[1:-1]
     number = np.searchsorted(edges, stamps, "right")
-    return [[messages[i] for i in np.flatnonzero(number == part)] for part in range(parts)]
+    return [[messages[i] for i in np.flatnonzero(number == part).tolist()] for part in range(parts)]
 
 
 def together(merged: Merged, parts: Sequence[Part]) -> Track:

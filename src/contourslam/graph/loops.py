@@ -218,21 +218,16 @@ class LoopFinder:
 
     def _find(self, number: int, points: Floats, pose: Floats, doubt: Floats, since: int) -> Tie | None:
         """Look for the patch in one place and its neighbours; None where nothing fits, or two poses do."""
-        window = np.minimum(3.0 * np.sqrt(np.diag(doubt)) + (0.3, 0.3, 0.05), WINDOW)
-        window[:2] = window[:2].max()
-        guess = self._places.into(number, pose)
-        known = self._places.around(number)
-        reach = PATCH_RADIUS + window[0]
-        known = known[(np.abs(known[:, :2] - guess[:2]) < reach).all(axis=1)]
+        window = window_of(doubt)
+        guess, known = self._places.into(number, pose), self._places.around(number)
+        known = within(known, guess, window)
         if not len(known) or not len(points):
             return None
         for method, propose in (("constellation", self._by_landmarks), ("search", self._by_contours)):
             found = propose(number, points, known, pose, window, since)
             if found is not None:
-                cells = CellMap(guess, reach)
-                cells.insert(known, np.zeros(3))
-                aligned = align(points, cells, found[0], FREE)
-                if aligned.overlap >= LEAST_PATCH_OVERLAP:
+                aligned = fitted(points, known, guess, window, found[0])
+                if aligned is not None:
                     return Tie(number, aligned, between_one(guess, aligned.pose), method, found[1])
         return None
 
@@ -251,9 +246,47 @@ class LoopFinder:
     ) -> tuple[Floats, float] | None:
         """Pose seen from the place that a search over all poses finds, and how good the next one is beside it."""
         self.searches += 1
-        grid = build_search_grid(known[:, :2], known[:, 2:])
-        some = points[:: max(len(points) // PATCH_POINTS, 1)]
-        guess = self._places.into(number, pose)
-        results = search(grid, some[:, :2], guess, window, normals=some[:, 2:], min_score=LEAST_SCORE, keep=2)
-        rival = results[1].score / results[0].score if len(results) > 1 else 0.0
-        return None if not results or rival > MOST_RIVAL else (results[0].pose, rival)
+        return search_contours(points, known, self._places.into(number, pose), window)
+
+
+def window_of(doubt: Floats) -> Floats:
+    """Half widths in which a pose of this covariance is searched for, shape (3,): m, m, rad."""
+    window: Floats = np.minimum(3.0 * np.sqrt(np.diag(doubt)) + (0.3, 0.3, 0.05), WINDOW)
+    window[:2] = window[:2].max()
+    return window
+
+
+def within(known: Floats, guess: Floats, window: Floats) -> Floats:
+    """Those contour points that a patch may touch whose pose lies within the window around a guess."""
+    near: Floats = known[(np.abs(known[:, :2] - guess[:2]) < PATCH_RADIUS + window[0]).all(axis=1)]
+    return near
+
+
+def search_contours(points: Floats, known: Floats, guess: Floats, window: Floats) -> tuple[Floats, float] | None:
+    """Look for a patch over all poses within a window.
+
+    Parameters
+    ----------
+    points, known : ndarray, shape (n, 4)
+        Contour points of the patch in its frame, and those in which it is looked for: x, y, nx, ny.
+    guess, window : ndarray, shape (3,)
+        Pose of the patch in the frame of `known` as far as it is known, and the half widths about it: m, m, rad.
+
+    Returns
+    -------
+    (ndarray, float) or None
+        Its pose, and the score of the best other one as a part of this one's; None where none stands out.
+    """
+    grid = build_search_grid(known[:, :2], known[:, 2:])
+    some = points[:: max(len(points) // PATCH_POINTS, 1)]
+    results = search(grid, some[:, :2], guess, window, normals=some[:, 2:], min_score=LEAST_SCORE, keep=2)
+    rival = results[1].score / results[0].score if len(results) > 1 else 0.0
+    return None if not results or rival > MOST_RIVAL else (results[0].pose, rival)
+
+
+def fitted(points: Floats, known: Floats, guess: Floats, window: Floats, proposed: Floats) -> Alignment | None:
+    """Align a patch where it was proposed to lie; None where too little of it fits."""
+    cells = CellMap(guess, PATCH_RADIUS + float(window[0]))
+    cells.insert(known, np.zeros(3))
+    aligned = align(points, cells, proposed, FREE)
+    return aligned if aligned.overlap >= LEAST_PATCH_OVERLAP else None

@@ -10,14 +10,19 @@ from contourslam.contour.contours import Ints
 from contourslam.detectors import make_detector
 from contourslam.graph.keeping import keep, remember
 from contourslam.graph.memory import Memory, Settled
+from contourslam.graph.places import ROBUST_TIES
 from contourslam.graph.pose_graph import poses_of, spreads
 from contourslam.graph.refine import refine
+from contourslam.joining.again import Again, look_again
 from contourslam.joining.building import Pair, build, keyframes_of
 from contourslam.joining.groups import Group, LeftOut, find_groups
 from contourslam.joining.joint import Joint
 from contourslam.maps.saved_map import SavedMap
+from contourslam.matching.small import invert
 
 ROUNDS = 5  # of tying and solving at most: maps that were bent come nearer to each other in each
+
+LOOKS = 3  # times that overlaps are looked for which the solution so far does not know
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +113,29 @@ def solve_map(built: SavedMap, config: Config) -> SavedMap:
         The same keyframes, sightings and stretches; corners and walls anew, those that several maps had being one.
     """
     memory = remember_all(built, config)
+    for _ in range(LOOKS):
+        saved = _refined(memory, built.about)
+        relations = saved.relations
+        memory = remember_all(saved, config)
+        found = [] if relations is None else look_again(memory, keyframes_of(saved), relations)
+        if not found:
+            return saved
+        for again in found:
+            _tie(memory, again)
+    return _refined(memory, built.about)
+
+
+def _tie(memory: Memory, again: Again) -> None:
+    anchor, places = memory.places.list[again.place].anchor, memory.places
+    information = invert(places.match_covariance(again.place, again.keyframe, again.pose))
+    memory.graph.relate(anchor, again.keyframe, again.pose, information, ROBUST_TIES, tie=True)
+
+
+def _refined(memory: Memory, about: Mapping[str, str]) -> SavedMap:
     count = len(memory.keyframes)
     factors, values = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings, ROUNDS)
-    poses = poses_of(values, count)
-    return keep(memory, Settled(poses, spreads(factors, values, np.arange(count)), factors), built.about)
+    settled = Settled(poses_of(values, count), spreads(factors, values, np.arange(count)), factors)
+    return keep(memory, settled, about)
 
 
 def remember_all(built: SavedMap, config: Config) -> Memory:
