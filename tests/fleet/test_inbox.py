@@ -241,3 +241,14 @@ def test_a_file_whose_reports_are_not_in_their_places_is_refused(tmp_path: Path)
     journal.add(report(1))
     with pytest.raises(JournalError, match="not in its place"):
         Inbox(tmp_path)
+
+
+def test_runs_are_taken_up_in_the_order_in_which_they_came(tmp_path: Path) -> None:
+    robots = "zoe", "adam", "mary"
+    inbox = Inbox(tmp_path)
+    for robot in robots:
+        inbox.take(encode(Report(robot, 5, 0, ())))
+    assert tuple(told.robot for told in Inbox(tmp_path).kept()) == robots
+    again = Inbox(tmp_path)
+    again.take(encode(Report("abel", 5, 0, ())))
+    assert tuple(told.robot for told in Inbox(tmp_path).kept()) == (*robots, "abel")

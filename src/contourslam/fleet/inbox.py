@@ -77,6 +77,7 @@ class Inbox:
         self._shelves: dict[Source, _Shelf] = {}
         self._youngest: dict[str, tuple[int, float]] = {}  # run of each robot that began last, and the stamp at which
         self.troubles: list[str] = []
+        self._journals = 0  # numbers given to files
         if folder is not None and folder.exists():
             for path in journals(folder):
                 self._recall(path)
@@ -176,6 +177,11 @@ class Inbox:
 
     def _follow(self, shelf: _Shelf, report: Report, data: bytes) -> tuple[Report, ...]:
         """Keep the next report, and those that have waited for it."""
+        if self._folder is not None and shelf.journal is None:
+            # Numbered, so that runs are taken up in the order in which they came, and common maps keep their frames.
+            name = f"{self._journals:06d}-{report.robot}-{report.run:016x}{SUFFIX}"
+            shelf.journal = Journal(self._folder / name)
+            self._journals += 1
         self._keep(shelf, data)
         out = [report]
         while (waiting := shelf.ahead.get(len(shelf.checksums))) is not None:
@@ -204,8 +210,7 @@ class Inbox:
     def _shelf(self, source: Source) -> _Shelf:
         shelf = self._shelves.get(source)
         if shelf is None:
-            journal = None if self._folder is None else Journal(self._folder / f"{source[0]}-{source[1]:016x}{SUFFIX}")
-            shelf = self._shelves[source] = _Shelf(journal)
+            shelf = self._shelves[source] = _Shelf(None)
             self._youngest[source[0]] = source[1], math.inf
         return shelf
 
@@ -226,6 +231,8 @@ class Inbox:
     def _recall(self, path: Path) -> None:
         """Take in what was kept of one run."""
         journal = Journal(path)
+        given = path.name.partition("-")[0]
+        self._journals = max(self._journals, int(given) + 1 if given.isdecimal() else 0)
         if journal.trouble:
             self.troubles.append(journal.trouble)
         shelf, source = _Shelf(journal), None
