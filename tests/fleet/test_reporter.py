@@ -136,7 +136,8 @@ def test_alignments_to_contours_that_were_told_are_those_to_the_graphs_own() -> 
 def test_a_drive_takes_a_small_part_of_what_its_scans_would() -> None:
     traffic = measure(messages(), CONFIG, lidar_mount=MOUNT)
     assert traffic.keyframes == len(driven()[0].memory.keyframes)
-    assert traffic.rate_sent < 2000.0 < 20_000.0 < traffic.scan_rate(10.0)
+    assert traffic.rate_sent < 2000.0
+    assert traffic.rate_sent < 0.2 * traffic.scan_rate(10.0)
     assert traffic.per_keyframe < 0.2 * traffic.plain_per_keyframe
 
 
