@@ -66,6 +66,8 @@ def render_room(
     model = compile_world(room, [Standing(RobotModel(), draw_flaws(0), pose) for pose in poses])
     _open_walls(model, mujoco, azimuth_deg)
     camera = _camera(mujoco, room, width / height, azimuth_deg)
+    if ways:  # from so high that the walls do not hide them
+        camera.elevation = -78.0
     try:
         imsave(path, _draw(mujoco, model, camera, ways, width, height))
     except drawing_errors(mujoco) as error:
