@@ -14,11 +14,13 @@ pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
 from contourslam.cli import main
 from contourslam.cli.locate import UNSURE
+from contourslam.cli.merge import Verdict
 from contourslam.config import Config
 from contourslam.geometry.poses import between, interpolate
 from contourslam.graph import GraphSlam, kept
 from contourslam.joining import find
-from contourslam.joining.joint import Apart
+from contourslam.joining.groups import LeftOut
+from contourslam.joining.joint import Apart, Evidence, Joint
 from contourslam.maps import SavedMap, load_map, save_map
 from contourslam.recordings import read_trajectory, write_trajectory
 from contourslam.scan import LaserScan, Odometry, TruePose
@@ -191,3 +193,18 @@ def test_a_map_that_cannot_be_joined_is_named(runs: tuple[Path, ...], tmp_path: 
     poor.write_bytes((runs[0] / "map.cmap").read_bytes()[:-100])
     assert f"{poor}: damaged in its section" in failure(*words(runs[1], poor, *house))
     assert not (tmp_path / "house.cmap").exists()
+
+
+def test_a_joint_that_contradicts_surer_ones_is_told() -> None:
+    evidence = Evidence(2, 3, 31.25, 0.015, 8.0, 0.4)
+    found = Joint(np.zeros(3), (), evidence, "search")
+    left = LeftOut((0, 1), np.array([3.0, -4.0, 0.1]), np.array([0.3, 0.4, 0.01]))
+    said = str(Verdict(("a", "b"), found, left))
+    assert said == (
+        "a and b: left out, 5.00 m off what surer joints say (σ 0.50 m): 2 corners, 3 walls, 31.2 m of surfaces agree, "
+        "1.5% contradicted, 8.0 m of way, best rival 40%"
+    )
+    told = Verdict(("a", "b"), found, left).as_json()
+    assert (told["joined"], told["reason"]) == (False, "contradicts others")
+    best = str(Verdict(("a", "b"), Apart("ambiguous", found), None))
+    assert best.startswith("a and b: apart, ambiguous: at best 2 corners")

@@ -62,7 +62,7 @@ class Merge:
         told = [self._write(group, number, names, paths, maps) for number, group in enumerate(groups)]
         alone = [name for n, name in enumerate(names) if not any(n in group.members for group in groups)]
         left_out = {left.maps: left for group in groups for left in group.left_out}
-        pairs = [_Verdict((names[a], names[b]), found[a, b], left_out.get((a, b))) for a, b in found]
+        pairs = [Verdict((names[a], names[b]), found[a, b], left_out.get((a, b))) for a, b in found]
         if self.json:
             print_json({"pairs": [pair.as_json() for pair in pairs], "merged": told, "apart": alone})
         else:
@@ -209,14 +209,24 @@ def _carry(path: Path, old: "SavedMap", new: "SavedMap", keys: Any, target: Path
 
 
 @dataclass(frozen=True)
-class _Verdict:
-    """What became of a pair of maps."""
+class Verdict:
+    """What became of a pair of maps.
+
+    Attributes
+    ----------
+    names : (str, str)
+    found : Joint, Apart or int
+        Of maps that hold the same drive, how many keyframes they share.
+    left_out : LeftOut or None
+        Where the joint contradicts surer ones.
+    """
 
     names: tuple[str, str]
     found: "Joint | Apart | int"
     left_out: "LeftOut | None"
 
     def as_json(self) -> dict[str, Any]:
+        """Give the verdict with its evidence."""
         from contourslam.joining.joint import Joint
 
         told: dict[str, Any] = {"maps": self.names}
@@ -258,7 +268,7 @@ def _joint_json(joint: "Joint") -> dict[str, Any]:
     return {"method": joint.method, "pose": joint.pose, "ties": len(joint.ties), **asdict(joint.evidence)}
 
 
-def _print(pairs: list[_Verdict], told: list[dict[str, Any]], alone: list[str], output: Path) -> None:
+def _print(pairs: list[Verdict], told: list[dict[str, Any]], alone: list[str], output: Path) -> None:
     for pair in pairs:
         print(pair)
     for one in told:
