@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from contourslam.report.sweep.findings import of_all
 from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.reading import sweep_of
 from contourslam.report.sweep.statistics import pairs, summary, wheels
@@ -86,3 +87,19 @@ def test_a_measure_that_is_not_there_is_not_known() -> None:
     assert MEASURES["time"].of({"scans_per_second": 500.0}) == 0.002
     assert math.isnan(MEASURES["time"].of({"scans_per_second": 0.0}))
     assert POSITION.of({"rmse.x": 0.03, "rmse.y": 0.04}) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ((0.8, 1.0, 1.0, 1.0), "Matched filter is better than Wu, Teh-Chin and CSS (by "),
+        ((1.0, 1.0, 1.3, 1.0), "Matched filter, Wu and CSS are better than Teh-Chin (by "),
+        ((1.0, 1.0, 1.0, 1.0), "No difference shown (intervals of the difference reach to "),
+    ],
+)
+def test_findings_name_those_that_differ_and_how_far(sweep_rows, factors: tuple[float, ...], said: str) -> None:
+    sweep = sweep_of(sweep_rows(factors))
+    found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+    sentence = of_all("corners", found, 5, 2, POSITION)
+    assert sentence.startswith(f"corners, 2 rooms and 5 conditions together, 24 drives. {said}")
+    assert sentence.endswith(" %).") and sentence.count("better") <= 1

@@ -1,7 +1,7 @@
 """What the tests allow to be said, in sentences."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from contourslam.report.naming import label
 from contourslam.report.paper import TABLE_I as PAPER
@@ -33,51 +33,60 @@ def _capital(text: str) -> str:
 
 
 def _said(found: Sequence[Pair], measure: Measure) -> str:
-    won: dict[str, list[Pair]] = {}
+    shown = [pair for pair in found if pair.better is not None]
+    if not shown:
+        few = {pair.test.verdict for pair in found} == {"too few drives"}
+        return "too few drives to show anything." if few else f"no difference shown{_reach(found, measure)}."
+    winners, losers = _grouped(shown, lambda pair: str(pair.better)), _grouped(shown, _loser)
+    if len(winners) <= len(losers):
+        said = [f"{label(name)} is better than {_names(map(_loser, group))}" for name, group in winners.items()]
+        groups = winners
+    else:
+        said = []
+        for name, group in losers.items():
+            verb = "is" if len(group) == 1 else "are"
+            said.append(f"{_names(str(pair.better) for pair in group)} {verb} better than {label(name)}")
+        groups = losers
+    sized = [f"{text}{_size(group, measure)}" for text, group in zip(said, groups.values(), strict=True)]
+    return f"{'; '.join(sized)}."
+
+
+def _grouped(found: Sequence[Pair], key: Callable[[Pair], str]) -> dict[str, list[Pair]]:
+    groups: dict[str, list[Pair]] = {}
     for pair in found:
-        if pair.better is not None:
-            won.setdefault(pair.better, []).append(pair)
-    if not won:
-        drives = {pair.test.verdict for pair in found} == {"too few drives"}
-        return "too few drives to show anything." if drives else f"no difference shown{_reach(found, measure)}."
-    sentences = []
-    for name, pairs in sorted(won.items(), key=lambda entry: -len(entry[1])):
-        others = [f"{label(_loser(pair))}{_by(pair, measure)}" for pair in pairs]
-        sentences.append(f"{label(name)} is better than {_listed(others)}")
-    undecided = sum(pair.better is None for pair in found)
-    left = f"; of the other {undecided} pairs no difference is shown" if undecided > 1 else ""
-    return f"{'; '.join(sentences)}{left}."
+        groups.setdefault(key(pair), []).append(pair)
+    return groups
 
 
 def _reach(found: Sequence[Pair], measure: Measure) -> str:
     """Tell how large a difference may still be that was not shown, as far as the intervals know."""
     ends = [pair.plain(end) for pair in found for end in (pair.interval.low, pair.interval.high)]
     known = [abs(end) for end in ends if math.isfinite(end)]
+    return f" (intervals of the difference reach to {_amount(max(known), measure)})" if known else ""
+
+
+def _size(found: Sequence[Pair], measure: Measure) -> str:
+    """Tell by how much the better ones are better, in the median over the drives."""
+    signs = [1.0 if pair.better == pair.first else -1.0 for pair in found]
+    sizes = [-pair.plain(sign * pair.test.median) for pair, sign in zip(found, signs, strict=True)]
+    known = sorted(size for size in sizes if math.isfinite(size))
     if not known:
-        return ""
-    size = f"{100 * max(known):.1f} %" if measure.ratio else f"{measure.scale * max(known):.3g} {measure.unit}"
-    return f" (the intervals of the mean differences reach to {size})"
-
-
-def _by(pair: Pair, measure: Measure) -> str:
-    effect = pair.effect if pair.better == pair.first else _reversed(pair)
-    if not math.isfinite(effect):
         return " (which failed more often)"
-    if pair.ratio:
-        return f" (by {-100 * effect:.1f} %)"
-    return f" (by {-measure.scale * effect:.3g} {measure.unit})"
+    low, high = (_amount(known[i], measure) for i in (0, -1))
+    number = low.partition(" ")[0]
+    return f" (by {low})" if low == high else f" (by {number} to {high})"
 
 
-def _reversed(pair: Pair) -> float:
-    """How much larger the second's error is than the first's."""
-    return math.expm1(-pair.test.median) if pair.ratio else -pair.test.median
+def _amount(value: float, measure: Measure) -> str:
+    return f"{100.0 * value:.1f} %" if measure.ratio else f"{measure.scale * value:.2g} {measure.step}".rstrip()
 
 
 def _loser(pair: Pair) -> str:
     return pair.second if pair.better == pair.first else pair.first
 
 
-def _listed(words: Sequence[str]) -> str:
+def _names(names: Iterable[str]) -> str:
+    words = [label(name) for name in names]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 

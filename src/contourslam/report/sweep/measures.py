@@ -51,6 +51,11 @@ class Measure:
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     @property
+    def step(self) -> str:
+        """Unit of a difference that is no ratio."""
+        return "points" if self.unit == "%" else self.unit
+
+    @property
     def column(self) -> str:
         """Head of a column, with the unit."""
         return f"{self.short} ({self.unit})" if self.unit else self.short

@@ -69,7 +69,7 @@ def cells_table(sweep: Sweep, measure: Measure, setting: str) -> Table:
 
 def pairs_table(found: Sequence[Pair], measure: Measure, name: str, caption: str) -> Table:
     """Every pair with its test."""
-    effect = "first minus second" + ("" if measure.ratio else f" ({measure.unit})")
+    effect = "first minus second" + ("" if measure.ratio else f" ({measure.step})")
     unit = " %" if measure.ratio else ""
     lost = any(pair.lost for pair in found)
     headers = [
