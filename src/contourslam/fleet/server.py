@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -102,6 +102,8 @@ class FleetServer:
     sites : mapping of str to str, optional
         Where each robot drives; robots of different sites are never compared, and one that is not named is at a site
         with all others that are not.
+    clock : callable, optional
+        Gives the time of which a round's budget is, s.
 
     Attributes
     ----------
@@ -114,9 +116,15 @@ class FleetServer:
     """
 
     def __init__(
-        self, config: Config | None = None, *, inbox: Inbox | None = None, sites: Mapping[str, str] | None = None
+        self,
+        config: Config | None = None,
+        *,
+        inbox: Inbox | None = None,
+        sites: Mapping[str, str] | None = None,
+        clock: Callable[[], float] = perf_counter,
     ) -> None:
         self._config, self._inbox, self._sites = config or Config(), inbox or Inbox(), dict(sites or {})
+        self._clock = clock
         self._lock = threading.Lock()  # held for moments; what follows is changed under it
         self._fresh: deque[Report] = deque(self._inbox.kept())
         self._faults: dict[Fault, None] = {Fault("", 0, trouble): None for trouble in self._inbox.troubles}
@@ -174,16 +182,16 @@ class FleetServer:
             s after which nothing more is begun but what new reports need; a view that is looked for takes some
             hundredths, a map that is solved anew about a hundredth a metre of way. All is done where left out.
         """
-        until = None if budget is None else perf_counter() + budget
+        until = None if budget is None else self._clock() + budget
         self._listen(now)
         for common in list(self._commons.values()):
             if common.due or now >= self._since.get(common.number, now) + LATEST:
                 self._advance(common)
-        while len(self.search) and (until is None or perf_counter() < until):
+        while len(self.search) and (until is None or self._clock() < until):
             found = self.search.step(self._where)
             if found is not None:
                 self._join(*found, now)
-        if not len(self.search) and (until is None or perf_counter() < until):
+        if not len(self.search) and (until is None or self._clock() < until):
             self._solve_one()
         self._place()
 
