@@ -166,7 +166,7 @@ def main() -> None:
     for name, pairs in unrelated(maps).items():
         rows.append([name, *apart([judge(*pair) for pair in pairs])])
         print(*rows[-1], flush=True)
-    publish(Table("joining-unrelated", UNRELATED, rows))
+    publish(Table("joining", UNRELATED, rows))
     rows = []
     for name, pairs in related(maps).items():
         rows.append([name, *together([judge(*pair) for pair in pairs])])
@@ -174,7 +174,7 @@ def main() -> None:
     for name, verdicts in pieces_of_one(maps).items():
         rows.append([name, *together(verdicts)])
         print(*rows[-1], flush=True)
-    publish(Table("joining-related", RELATED, rows))
+    publish(Table("joining_related", RELATED, rows))
 
 
 if __name__ == "__main__":
