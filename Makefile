@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-docs test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
+.PHONY: help demo table-one docs test test-docs test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -9,6 +9,9 @@ BIN := $(VENV)/bin
 # The first interpreter that is new enough; `make PYTHON=/path/to/python3.12 demo` chooses another.
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$p" && break; done)
+# The recordings of `make table-one`; where they lie beside the project, the experiment names them as it stands.
+LOGS ?= ../shared/data
+LOGS_EXPERIMENT = $(if $(filter ../shared/data,$(LOGS)),examples/table_one_logs.toml,out/table_one/logs.toml)
 # Byte code is written as modules are first used: compiling all of it now would take longer than the download.
 unexport PYTHONDONTWRITEBYTECODE
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
@@ -20,6 +23,16 @@ demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, wri
 	$(BIN)/contourslam compare --room furnished_room --seeds 3 --jobs 2 --output demo --overwrite
 	$(BIN)/contourslam run demo/recording --output demo/run --overwrite
 	@echo "Open demo/index.html in a browser; demo/run holds the map of the first recording."
+
+table-one: $(VENV)/.all ## Ask the paper's question anew and write docs/table_one.md; an hour or two. LOGS=FOLDER has the recordings.
+	mkdir -p out/table_one
+	$(BIN)/contourslam sweep examples/table_one.toml --output out/table_one/rooms || test $$? -eq 1
+	if test -d "$(LOGS)"; then \
+	  sed 's#\.\./\.\./shared/data#$(abspath $(LOGS))#; s#"03_#"../../examples/03_#' examples/table_one_logs.toml > out/table_one/logs.toml && \
+	  { $(BIN)/contourslam sweep $(LOGS_EXPERIMENT) --output out/table_one/logs || test $$? -eq 1; }; \
+	else echo "No recordings in $(LOGS): the table is made without them; LOGS=FOLDER names their folder."; fi
+	$(BIN)/contourslam sweep-report $$(ls -d out/table_one/rooms out/table_one/logs 2> /dev/null) --output out/table_one/report \
+	  --overwrite --markdown docs/table_one.md
 
 test: $(VENV)/.dev ## Run the tests.
 	$(BIN)/python -m pytest -n auto --dist loadfile

@@ -125,6 +125,12 @@ def test_without_a_document_all_of_the_report_is_written(sweep_rows, log_rows, t
     assert titles[0] == "What can be said" and titles[-1] == "Reproduce this" and len(titles) == 9
 
 
+def test_a_place_for_what_was_not_run_says_so(log_rows, tmp_path: Path) -> None:
+    (tmp_path / "a.md").write_text("<!-- sweep:noise -->\n<!-- /sweep:noise -->\n")
+    write_markdown(tmp_path / "a.md", sweep_of(log_rows), POSITION)
+    assert "Nothing of this was run." in (tmp_path / "a.md").read_text()
+
+
 def test_a_document_with_no_place_or_an_unknown_one_is_refused(sweep_rows, tmp_path: Path) -> None:
     document, sweep = tmp_path / "a.md", sweep_of(sweep_rows(seeds=1))
     document.write_text("# Nothing\n")

@@ -43,7 +43,7 @@ def write_markdown(path: Path, sweep: Sweep, measures: Sequence[Measure], *, com
         If the document has no place, or one for a part that there is none of, or a file cannot be read or written.
     """
     parts = {part.anchor: part for part in Parts(sweep, measures, command).all()}
-    whole = "\n\n".join(f"## {part.title}\n\n{_place(name, '')}" for name, part in parts.items())
+    whole = "\n\n".join(f"## {part.title}\n\n{_place(name, '')}" for name, part in parts.items() if part.items)
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else f"# Sweep of landmark detectors\n\n{whole}\n"
     except (OSError, UnicodeDecodeError) as error:
@@ -70,7 +70,8 @@ def _place(name: str, content: str) -> str:
 
 
 def _part(part: Part, stem: str) -> str:
-    return "".join(f"{text}\n\n" for item in part.items if (text := _item(item, stem)))
+    texts = [text for item in part.items if (text := _item(item, stem))] or ["Nothing of this was run."]
+    return "".join(f"{text}\n\n" for text in texts)
 
 
 def _charts(items: Sequence[Item]) -> list[Chart]:

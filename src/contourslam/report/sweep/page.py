@@ -59,7 +59,7 @@ def write_sweep_report(folder: Path, sweep: Sweep, measures: Sequence[Measure], 
             if _OWN.fullmatch(path.name):
                 remove(path)
     write_text(folder / "metrics.json", to_json(metrics))
-    found = parts.all()
+    found = [part for part in parts.all() if part.items]
     sections = [
         markup.Section(part.anchor, part.title, "\n".join(_html(item, folder) for item in part.items)) for part in found
     ]

@@ -38,7 +38,8 @@ def table_one(sweep: Sweep, measures: Sequence[Measure], setting: str, condition
             rows.append(Row(f"{label(room)}, raw odometry", [*odometry, *[Cell("")] * (1 + len(measures))], aside=True))
     headers = ["room, detector", *(columns[i].column for i in kept), "drives"]
     headers += [f"by {one.short} better than" for one in measures]
-    caption = f"{label(setting)}, {condition.name}: RMSE, mean over the drives and its 95 % interval"
+    what = "RMSE of position, x, y and heading, and what else was measured"
+    caption = f"{label(setting)}, {condition.name}. {what}: mean over the drives and its 95 % interval"
     return Table(f"table_one_{setting}", caption, headers, rows)
 
 
@@ -176,8 +177,9 @@ def effect_text(pair: Pair, measure: Measure) -> str:
 
 
 def _signed(pair: Pair, measure: Measure, difference: float) -> str:
-    value = (100.0 if pair.ratio else measure.scale) * pair.plain(difference)
-    return f"{value:+.{1 if pair.ratio else measure.digits + 1}f}".replace("-", "−")
+    digits = 1 if pair.ratio else measure.digits + 1
+    value = round((100.0 if pair.ratio else measure.scale) * pair.plain(difference), digits)
+    return f"{value:+.{digits}f}".replace("-", "−") if value else f"{0:.{digits}f}"
 
 
 def p_text(p: float) -> str:
