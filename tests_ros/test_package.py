@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 from ruamel.yaml import YAML
 
+from contourslam_ros.fleet_settings import FleetConfig
 from contourslam_ros.part_settings import BaseNodeConfig, CameraConfig, LidarConfig
 from contourslam_ros.settings import NodeConfig
 
@@ -77,7 +78,7 @@ def test_nodes_and_what_they_need_are_where_ros_looks_for_them(installed: Path) 
         names = {path.name for path in (PACKAGE / folder).iterdir() if path.is_file()}
         assert names == {path.name for path in (share / folder).iterdir()}
     programs = {path.name for path in (installed / "lib" / "contourslam_ros").iterdir()}
-    assert programs == {*LAUNCHES.values(), *PARTS}
+    assert programs == {*LAUNCHES.values(), *PARTS, "fleet_server"}
 
 
 @pytest.mark.parametrize("name", LAUNCHES)
@@ -137,6 +138,17 @@ def test_the_whole_robot_is_started_with_parameters_that_its_nodes_have(monkeypa
     said = {name: to.values for part in PARTS for name, to in nodes[part].get("remappings", [])}
     assert said == {name: to.values for name, to in nodes["slam"]["remappings"]}
     assert nodes["camera"]["condition"].values[0].values == ("camera",)
+
+
+def test_the_fleet_s_launch_file_names_what_is_there(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = entities("fleet", monkeypatch)
+    nodes = {item.named["executable"]: item.named for item in found if item.kind == "Node"}
+    (given,) = nodes["fleet_server"]["parameters"]
+    assert set(given) <= set(FleetConfig.__dataclass_fields__) | {"use_sim_time"}
+    declared = [item.values[0] for item in found if item.kind == "DeclareLaunchArgument"]
+    assert {part.values[0].values[0] for part in given.values()} <= set(declared)
+    ((share, *parts),) = nodes["rviz2"]["arguments"][1].values
+    assert installed.joinpath("share", *share.values, *parts).is_file()
 
 
 def test_rviz_shows_topics_that_the_nodes_publish_with_the_quality_of_service_they_have() -> None:

@@ -35,6 +35,7 @@ setup(
             f"slam = {NAME}.slam:main",
             f"localization = {NAME}.localization:main",
             f"replay = {NAME}.replay:main",
+            f"fleet_server = {NAME}.fleet_server:main",
             f"lidar = {NAME}.lidar:main",
             f"base = {NAME}.base:main",
             f"camera = {NAME}.camera:main",

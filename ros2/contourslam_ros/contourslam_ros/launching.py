@@ -12,6 +12,9 @@ from launch_ros.substitutions import FindPackageShare
 
 SHARE = FindPackageShare("contourslam_ros")
 PARAMETERS = PathJoinSubstitution([SHARE, "config", "parameters.yaml"])
+FLEET = DeclareLaunchArgument(
+    "fleet", default_value="", description="Name under which the robot tells a fleet server what it maps."
+)
 PICTURE = PathJoinSubstitution([SHARE, "rviz", "contourslam.rviz"])
 
 

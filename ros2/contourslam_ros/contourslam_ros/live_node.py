@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from tf2_msgs.msg import TFMessage
@@ -22,18 +22,20 @@ from contourslam.live.processed import Processed
 from contourslam.live.rehearsal import SHORT, stages
 from contourslam.live.session import Session
 from contourslam.live.warming import warm_up
-from contourslam.live.worker import Worker
+from contourslam.live.worker import Onlooker, Worker
 from contourslam.robot.config import load_robot
 from contourslam.robot.live_map import settings_of
 from contourslam.scan import LaserScan, Odometry
 from contourslam.view.followed import Followed
 from contourslam.view.server import ServeError
 from contourslam.view.serving import page_server
+from contourslam_ros.fleet_link import FleetLink
 from contourslam_ros.frames import SENT
 from contourslam_ros.grid_sender import GridSender
 from contourslam_ros.latency import Latencies
 from contourslam_ros.map_sender import MapSender
 from contourslam_ros.messages import diagnostic_message, header, pose_message, transform_message
+from contourslam_ros.onlookers import Onlookers
 from contourslam_ros.sensors import Sensors
 from contourslam_ros.services import Services
 from contourslam_ros.settings import Settings, declared
@@ -62,6 +64,8 @@ class LiveNode(Node):
         Stages of :mod:`contourslam.live.rehearsal` that the node may come to.
     back_end : str or None
         What the live page calls the work; None for that of the configuration.
+    link : FleetLink or None
+        What tells a fleet server of the mapping.
     failure : BaseException or None
         Why the node cannot go on.
     """
@@ -74,6 +78,7 @@ class LiveNode(Node):
         self.settings = _of_robot(declared(self))
         self.config = self.settings.node
         self.failure: BaseException | None = None
+        self.link: FleetLink | None = None
         self._sensors = Sensors(
             self, self.settings, on_scan=self._on_scan, on_odometry=self._on_odometry, on_refused=self._on_refused
         )
@@ -119,6 +124,8 @@ class LiveNode(Node):
         if self.config.publish_tf and self.config.odometry != "none":
             self.create_timer(self.config.tf_period, self._send_transform, clock=steady)
         Services(self, self.running, self.config.map_file)
+        if self.link is not None:
+            self.link.start()
         if self.config.view_port:
             self._serve_page()
         self._sensors.listen()
@@ -128,6 +135,8 @@ class LiveNode(Node):
         """End the session: what is to be saved by itself is saved."""
         if self._worker is not None:
             self._worker.stop()
+            if self.link is not None:
+                self.link.finish()
             self._worker = self._session = None
             self._grid.close()
         self._serving.close()
@@ -153,10 +162,15 @@ class LiveNode(Node):
             except ContourslamError as error:
                 self.failure = error
                 return
-            page = None if self._page is None else self._page.follow(self._session, self._sensors.mounting.pose)
+            onlookers: list[Onlooker] = []
+            if self.link is not None:
+                onlookers.append(self.link.follow(self._session))
+            if self._page is not None:
+                onlookers.append(self._page.follow(self._session, self._sensors.mounting.pose))
             self._worker = Worker(
-                self._session, self._on_done, clock=time.monotonic, failed=self._on_failure, onlooker=page
-            )
+                self._session, self._on_done, clock=time.monotonic, failed=self._on_failure,
+                onlooker=Onlookers(onlookers) if onlookers else None,
+            )  # fmt: skip
             self._worker.start()
             while self._early:
                 self._worker.push_odometry(self._early.popleft())
@@ -179,6 +193,8 @@ class LiveNode(Node):
     def _on_done(self, done: Processed) -> None:
         """Send the pose; called in the worker's thread."""
         stamp, came = self._arrived.pop(done.stamp)
+        if self.link is not None:
+            self.link.stamp = stamp
         if not done.localized:
             return
         head = header(stamp, self.config.frame(self.config.map_frame))
@@ -186,7 +202,7 @@ class LiveNode(Node):
         self._latencies.add((time.monotonic_ns() - came) * 1e-9)
         if self.config.publish_tf and self.config.odometry == "none":
             base = transform_message(head, self.config.frame(self.config.base_frame), done.T_map_base)
-            self._transforms.publish(TFMessage(transforms=[base]))
+            self._send_transforms(base)
 
     def _on_failure(self, error: BaseException) -> None:
         self.failure = error
@@ -213,7 +229,12 @@ class LiveNode(Node):
         seconds, nanoseconds = divmod(now + round(self.config.tf_ahead * 1e9), 1_000_000_000)
         head = header(Time(sec=seconds, nanosec=nanoseconds), self.config.frame(self.config.map_frame))
         odom = transform_message(head, self.config.frame(self.config.odom_frame), correction)
-        self._transforms.publish(TFMessage(transforms=[odom]))
+        self._send_transforms(odom)
+
+    def _send_transforms(self, below: TransformStamped) -> None:
+        """Send what lies below the map, and where the map lies in a common one."""
+        above = None if self.link is None else self.link.transform(below.header.stamp)
+        self._transforms.publish(TFMessage(transforms=[below] if above is None else [above, below]))
 
     def _send_map(self) -> None:
         if self._session is not None:
@@ -227,6 +248,8 @@ class LiveNode(Node):
         told = self._missing()
         if self._session is not None:
             told = (*self._session.diagnostics(time.monotonic()), self._latencies.diagnostic())
+        if self.link is not None:
+            told = (*told, self.link.diagnostic())
         head = header(self.get_clock().now().to_msg(), "")
         self._diagnostics.publish(diagnostic_message(head, self.get_fully_qualified_name(), told))
 

@@ -25,6 +25,8 @@ class Localization(LiveNode):
         super().__init__("localization")
         if not self.config.map_file:
             raise ConfigError("localization needs a map: give its file as the parameter map_file")
+        if self.config.fleet:
+            raise ConfigError("localization maps nothing that a fleet could be told; give the parameter fleet to slam")
 
     def begin(self, mount: np.ndarray) -> Session:
         """Localise in the map."""

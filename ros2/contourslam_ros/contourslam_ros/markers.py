@@ -12,13 +12,14 @@ from visualization_msgs.msg import Marker, MarkerArray
 from contourslam.slam.landmark_map import CornerMap, WallMap
 
 Floats = NDArray[np.float64]
+Colour = tuple[float, float, float]
 
 SIDE = 0.25  # m, of the two lines that show how a corner opens
 STEPS = 16  # of an ellipse
 WALL, CORNER, ELLIPSE = (0.13, 0.35, 0.65), (0.84, 0.33, 0.10), (0.45, 0.45, 0.45)
 
 
-def map_markers(head: Header, corners: CornerMap, walls: WallMap, sigmas: float) -> MarkerArray:
+def map_markers(head: Header, corners: CornerMap, walls: WallMap, sigmas: float, within: str = "") -> MarkerArray:
     """Draw a map.
 
     Parameters
@@ -28,6 +29,8 @@ def map_markers(head: Header, corners: CornerMap, walls: WallMap, sigmas: float)
     walls : WallMap
     sigmas : float
         Half axes of the ellipses in standard deviations.
+    within : str
+        Before the markers' names.
 
     Returns
     -------
@@ -40,11 +43,11 @@ def map_markers(head: Header, corners: CornerMap, walls: WallMap, sigmas: float)
     wall_ellipses = _outlines(ends, end_covariances, sigmas)
     return MarkerArray(
         markers=[
-            _marker(head, "walls", Marker.LINE_LIST, _points(ends), 0.03, WALL),
-            _marker(head, "wall_ellipses", Marker.LINE_LIST, wall_ellipses, 0.008, ELLIPSE),
-            _marker(head, "corners", Marker.SPHERE_LIST, _points(corners.positions), 0.08, CORNER),
-            _marker(head, "corner_sides", Marker.LINE_LIST, _points(_sides(corners)), 0.02, CORNER),
-            _marker(head, "corner_ellipses", Marker.LINE_LIST, corner_ellipses, 0.008, ELLIPSE),
+            marker(head, f"{within}walls", Marker.LINE_LIST, _points(ends), 0.03, WALL),
+            marker(head, f"{within}wall_ellipses", Marker.LINE_LIST, wall_ellipses, 0.008, ELLIPSE),
+            marker(head, f"{within}corners", Marker.SPHERE_LIST, _points(corners.positions), 0.08, CORNER),
+            marker(head, f"{within}corner_sides", Marker.LINE_LIST, _points(_sides(corners)), 0.02, CORNER),
+            marker(head, f"{within}corner_ellipses", Marker.LINE_LIST, corner_ellipses, 0.008, ELLIPSE),
         ]
     )
 
@@ -97,16 +100,29 @@ def _sides(corners: CornerMap) -> Floats:
     return np.stack([starts, tips], axis=2).reshape(-1, 2)
 
 
-def _marker(
-    head: Header, name: str, kind: int, points: list[Point], size: float, colour: tuple[float, float, float]
-) -> Marker:
-    marker = Marker(header=head, ns=name, type=kind)
+def marker(head: Header, name: str, kind: int, points: list[Point], size: float, colour: Colour) -> Marker:
+    """Make a marker of points, or one that removes itself where there are none.
+
+    Parameters
+    ----------
+    head : Header
+    name : str
+        Its namespace.
+    kind : int
+        Such as ``Marker.LINE_LIST``.
+    points : list of Point
+    size : float
+        Width or diameter, m.
+    colour : tuple of float
+        Red, green, blue, 0 to 1.
+    """
+    made = Marker(header=head, ns=name, type=kind)
     if not points:  # RViz complains of a list without points
-        marker.action = Marker.DELETE
-        return marker
-    marker.pose.orientation.w = 1.0
-    marker.scale.x = marker.scale.y = marker.scale.z = size
+        made.action = Marker.DELETE
+        return made
+    made.pose.orientation.w = 1.0
+    made.scale.x = made.scale.y = made.scale.z = size
     red, green, blue = colour
-    marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
-    marker.points = points
-    return marker
+    made.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
+    made.points = points
+    return made

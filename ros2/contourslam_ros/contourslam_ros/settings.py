@@ -8,6 +8,7 @@ import dataclasses
 import inspect
 import json
 import math
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 T = TypeVar("T")
+
+
+def is_name(text: str) -> bool:
+    """Whether a text can be a part of a topic's name."""
+    return re.fullmatch(r"[A-Za-z]([A-Za-z0-9]|_(?!_))*", text) is not None and not text.endswith("_")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +66,10 @@ class NodeConfig:
     """slam keeps its map here, saved by itself, and continues it where it is there; localization needs it."""
     robot: str = ""
     """The robot's file, robot.yaml: its lidar's range and its wheels' noise are then used, unless given here."""
+    fleet: str = ""
+    """slam tells a fleet server what it maps, under this name of the robot: several_robots.md; empty for not at all."""
+    common_frame: str = "common_map"
+    """Frame of a map that robots share; its number is put after it."""
     view_port: int = 0
     """Port at which the node serves the live page, for a browser (docs/view.md); 0 for no page."""
     view_host: str = HOST
@@ -75,6 +85,10 @@ class NodeConfig:
             raise ConfigError(f"parameter view_port must lie between 0 and 65535, got {self.view_port!r}")
         if not self.view_port and self.view_host != HOST:
             raise ConfigError("parameter view_host says where the page is served that view_port asks for; give both")
+        if self.fleet and not is_name(self.fleet):
+            raise ConfigError(
+                f"parameter fleet names the robot by letters, digits and _, first no digit, got {self.fleet!r}"
+            )
 
     def frame(self, name: str) -> str:
         """Put the prefix before one of the frames' names."""

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from contourslam.errors import ConfigError
 from contourslam.live.session import Session
 from contourslam.live.start import mapping
+from contourslam_ros.fleet_link import FleetLink
 from contourslam_ros.live_node import LiveNode
 from contourslam_ros.running import run
 
@@ -19,6 +21,10 @@ class Slam(LiveNode):
         super().__init__("slam")
         if self.settings.core.back_end == "graph":
             self.rehearsed = "mapping, graph", "continuing a map, graph"
+        if self.config.fleet:
+            if self.settings.core.back_end != "graph":
+                raise ConfigError("a fleet is told keyframes, which only the graph has; set back_end to graph")
+            self.link = FleetLink(self, self.config, self.settings.live)
 
     def begin(self, mount: np.ndarray) -> Session:
         """Map anew, or continue the map that is there."""

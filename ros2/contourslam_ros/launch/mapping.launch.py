@@ -6,7 +6,7 @@ ros2 launch contourslam_ros mapping.launch.py map_file:=$HOME/house.cmap rviz:=t
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 
-from contourslam_ros.launching import node_and_rviz
+from contourslam_ros.launching import FLEET, node_and_rviz
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -14,4 +14,4 @@ def generate_launch_description() -> LaunchDescription:
     map_file = DeclareLaunchArgument(
         "map_file", default_value="", description="Where the map is kept, and continued from."
     )
-    return node_and_rviz("slam", map_file)
+    return node_and_rviz("slam", map_file, FLEET, texts=("fleet",))

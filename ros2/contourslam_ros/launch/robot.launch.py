@@ -10,7 +10,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from contourslam_ros.launching import node_and_rviz
+from contourslam_ros.launching import FLEET, node_and_rviz
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -21,12 +21,13 @@ def generate_launch_description() -> LaunchDescription:
     return node_and_rviz(
         "slam",
         map_file,
+        FLEET,
         DeclareLaunchArgument("robot", description="The file that says how the robot is built: robot.yaml."),
         DeclareLaunchArgument("camera", default_value="true", description="false: its pictures are left out."),
         part("lidar", remappings=[("scan", LaunchConfiguration("scan"))]),
         part("base", remappings=[("odom", LaunchConfiguration("odom"))]),
         part("camera", condition=IfCondition(LaunchConfiguration("camera"))),
-        texts=("robot",),
+        texts=("robot", "fleet"),
     )
 
 
