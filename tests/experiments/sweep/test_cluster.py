@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -111,7 +112,9 @@ def command(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen]]:
     def start(path: Path, results: Path, *words: str) -> subprocess.Popen:
         line = [sys.executable, "-W", "error", "-m", "contourslam", "sweep", path, "-o", results, "--json", *words]
         with (tmp_path / "said").open("w") as out, (tmp_path / "complained").open("w") as complaints:
-            started.append(subprocess.Popen(line, stdout=out, stderr=complaints, env=ENVIRONMENT))
+            started.append(
+                subprocess.Popen(line, stdout=out, stderr=complaints, env=ENVIRONMENT, start_new_session=True)
+            )
         return started[-1]
 
     yield start
@@ -188,6 +191,19 @@ def test_the_whole_command_killed_goes_on_where_it_was_and_a_run_that_kills_its_
     ]
     after = Store(str(results)).starts()
     assert {key: after[key] for key in finished} == {key: before[key] for key in finished}
+
+
+def test_ctrl_c_lets_the_runs_at_hand_end_and_keeps_what_is_done(command, tmp_path):
+    path, results = experiment(tmp_path, 40), tmp_path / "results"
+    sweep = command(path, results, "--jobs", "1")
+    wait_for(lambda: rows(results) >= 2, sweep)
+    os.killpg(sweep.pid, signal.SIGINT)  # as a terminal sends it, to the workers too
+    code, said, complaint = ended(sweep, tmp_path)
+    assert code == 130
+    assert complaint.endswith("interrupted; what is done is kept, and the same command goes on from there\n")
+    store = Store(str(results))
+    assert json.loads(said)["done"] == len(store.status()) < 40
+    assert store.starts() == dict.fromkeys(store.status(), 1)
 
 
 def test_a_worker_of_another_version_is_refused_before_anything_is_run(cluster, command, tmp_path):

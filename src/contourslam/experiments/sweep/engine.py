@@ -182,6 +182,8 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
         finally:
             _close(client)
         return
+    # A nanny starts a worker that died again, and again; the cluster must not give it up meanwhile.
+    require("dask").config.set({"distributed.deploy.lost-worker-timeout": "1 day"})
     cluster = distributed.LocalCluster(
         n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL, env=_ONE_THREAD, preload=_PRELOAD,
