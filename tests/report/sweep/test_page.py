@@ -29,6 +29,7 @@ def report(tmp_path_factory: pytest.TempPathFactory, sweep_rows, log_rows) -> Pa
 def test_better_is_said_only_where_a_test_says_so(report: Path) -> None:
     metrics = json.loads((report / "metrics.json").read_text())
     (together,) = [line for line in metrics["findings"]["position"] if "2 rooms and 5 conditions together" in line]
+    assert sum("over all its 5 conditions" in line for line in metrics["findings"]["position"]) == 2
     assert "Matched filter is better than" in together and together.count("better") == 1
     assert {pair["better"] for pair in metrics["pairs"]["pairs_position_corners"]} == {"matched_filter", None}
     page = (report / "index.html").read_text()

@@ -61,6 +61,14 @@ def test_the_middle_of_a_star_is_where_its_arms_cross(sweep_rows) -> None:
     assert sweep.centre("walls") is None
 
 
+def test_rooms_count_together_by_what_all_of_them_have(sweep_rows) -> None:
+    rows = sweep_rows(seeds=1)
+    only = [row for row in rows if row["room"] == "furnished_room" or (row["noise"], row["beams"]) == (0.01, 500)]
+    sweep = sweep_of(only)
+    assert len(sweep.conditions("corners")) == len(sweep.conditions("corners", "furnished_room")) == 5
+    assert [(one.noise, one.beams) for one in sweep.common("corners")] == [(0.01, 500)]
+
+
 def test_the_wheels_are_those_of_each_drive_once(sweep_rows) -> None:
     sweep = sweep_of(sweep_rows(failed=[("matched_filter", 0)]))
     found = wheels(sweep, POSITION, "furnished_room", sweep.conditions("corners")[0])

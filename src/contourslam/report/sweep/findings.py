@@ -16,6 +16,13 @@ def of_rooms(condition: Condition, found: Sequence[Pair], rooms: Sequence[str], 
     return f"{label(condition.setting)}, {condition.name}. {' '.join(map(_capital, said))}"
 
 
+def of_axes(setting: str, room: str, found: Sequence[Pair], conditions: int, measure: Measure) -> str:
+    """Say the same of a room over all conditions that a setting was run on there."""
+    drives = max((pair.test.drives for pair in found), default=0)
+    over = f"{label(room)} over all its {conditions} conditions, {drives} drives"
+    return f"{label(setting)}, {over}. {_capital(_said(found, measure))}"
+
+
 def of_all(setting: str, found: Sequence[Pair], conditions: int, rooms: int, measure: Measure) -> str:
     """Say the same over everything that a setting was run on."""
     drives = max((pair.test.drives for pair in found), default=0)

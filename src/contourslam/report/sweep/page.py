@@ -105,7 +105,11 @@ def sweep_metrics(parts: Parts) -> dict[str, Any]:
         ],
         "pairs": {
             f"{name}_{metric}_{setting}": list(map(_pair, found))
-            for name, tests in (("pairs", parts.together), ("pairs_by_room", parts.by_room))
+            for name, tests in (
+                ("pairs", parts.together),
+                ("pairs_by_room", parts.by_room),
+                ("pairs_over_axes", parts.over_axes),
+            )
             for (metric, setting), found in tests.items()
         },
         "recordings": [

@@ -46,12 +46,15 @@ class Parts:
         self.sweep, self.measures, self.command = sweep, measures, command
         rooms = [(room, [room]) for room in sweep.rooms]
         self.by_room: Tests = {}
+        self.over_axes: Tests = {}
         self.together: Tests = {}
         for measure, setting in product(measures, sweep.settings):
             centre = sweep.centre(setting)
             self.by_room[measure.name, setting] = [] if centre is None else pairs(sweep, measure, rooms, [centre])
-            every = sweep.conditions(setting)
-            self.together[measure.name, setting] = pairs(sweep, measure, [("", sweep.rooms)], every)
+            every, common = sweep.conditions(setting), sweep.common(setting)
+            several = [(room, places) for room, places in rooms if len(sweep.conditions(setting, room)) > 1]
+            self.over_axes[measure.name, setting] = pairs(sweep, measure, several, every)
+            self.together[measure.name, setting] = pairs(sweep, measure, [("", sweep.rooms)], common)
 
     def all(self) -> list[Part]:
         """Give all of them; one of which nothing was run has no items."""
@@ -73,8 +76,13 @@ class Parts:
         for setting in sweep.settings:
             if centre := sweep.centre(setting):
                 said.append(findings.of_rooms(centre, self.by_room[measure.name, setting], sweep.rooms, measure))
-            conditions = len(sweep.conditions(setting))
-            if conditions > 1 or len(sweep.rooms) > 1:
+            said += [
+                findings.of_axes(setting, room, found, len(sweep.conditions(setting, room)), measure)
+                for room in sweep.rooms
+                if (found := [pair for pair in self.over_axes[measure.name, setting] if pair.place == room])
+            ]
+            conditions = len(sweep.common(setting))
+            if conditions and len(sweep.rooms) > 1:
                 found = self.together[measure.name, setting]
                 said.append(findings.of_all(setting, found, conditions, len(sweep.rooms), measure))
         if measure.name == "position" and (beside := self._beside_the_paper()) is not None:
@@ -117,6 +125,7 @@ class Parts:
         mine = [run for run in sweep.simulated if run.condition.setting == setting]
         rooms = once(run.drive.place for run in mine)
         seeds = {len({run.drive.seed for run in mine if run.drive.place == room}) for room in rooms}
+        counts = {room: len(sweep.conditions(setting, room)) for room in rooms}
         noise = sorted({100.0 * run.condition.noise for run in mine if run.condition.noise is not None})
         lengths = sorted({run.row.get("duration") or 0.0 for run in mine})
         parts = (
@@ -126,7 +135,9 @@ class Parts:
             "noise " + (", ".join(f"{value:g}" for value in noise) + " cm" if noise else "the lidar's own"),
             ", ".join(map(str, sorted({run.condition.beams for run in mine if run.condition.beams is not None})))
             + " beams",
-            findings.counted(len(sweep.conditions(setting)), "condition"),
+            ", ".join(f"{findings.counted(n, 'condition')} in the {label(room)}" for room, n in counts.items())
+            if len(set(counts.values())) > 1
+            else findings.counted(len(sweep.conditions(setting)), "condition"),
         )
         return f"{label(setting)}: {'; '.join(parts)}."
 
@@ -191,9 +202,9 @@ class Parts:
     def _pairs_by(self, measure: Measure, setting: str) -> list[Item]:
         sweep, of = self.sweep, f"{label(setting)}, by {measure.title}"
         together, apart = self.together[measure.name, setting], self.by_room[measure.name, setting]
-        conditions, end = sweep.conditions(setting), f"{measure.name}_{setting}"
-        share = f"{of}: share of the drives in which the row's detector is better"
-        every = f"{of}, all rooms and {findings.counted(len(conditions), 'condition')}"
+        end, common = f"{measure.name}_{setting}", findings.counted(len(sweep.common(setting)), "condition")
+        share = f"{of}, all rooms and {common}: share of the drives in which the row's detector is better"
+        every = f"{of}, all rooms and {common}"
         table = tables.pairs_table(together, measure, f"pairs_{end}", every)
         items: list[Item] = [tables.matrix_table(sweep, together, f"matrix_{end}", share)]
         items.append(table if measure is self.measures[0] else Folded(f"{of}: the tests", [table]))
@@ -201,6 +212,10 @@ class Parts:
             each = f"{of}, {centre.name}: corrected for all {len(apart)} pairs"
             rooms = tables.pairs_table(apart, measure, f"pairs_by_room_{end}", each)
             items.append(Folded(f"{of}: room by room", [rooms]))
+        if over := self.over_axes[measure.name, setting]:
+            each = f"{of}, each room over all its conditions: corrected for all {len(over)} pairs"
+            axes = tables.pairs_table(over, measure, f"pairs_over_axes_{end}", each)
+            items.append(Folded(f"{of}: room by room, over noise and beams", [axes]))
         return items
 
     def _logs(self) -> Part:

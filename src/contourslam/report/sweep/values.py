@@ -120,10 +120,19 @@ class Sweep:
         """In the order of the table."""
         return once(run.drive.place for run in self.simulated)
 
-    def conditions(self, setting: str) -> list[Condition]:
-        """Conditions of the simulated runs of a setting, by noise and beams."""
-        found = once(run.condition for run in self.simulated if run.condition.setting == setting)
+    def conditions(self, setting: str, place: str | None = None) -> list[Condition]:
+        """Conditions of the simulated runs of a setting, in one room or all, by noise and beams."""
+        found = once(
+            run.condition
+            for run in self.simulated
+            if run.condition.setting == setting and place in (None, run.drive.place)
+        )
         return sorted(found, key=lambda one: (one.noise is None, one.noise or 0.0, one.beams or 0))
+
+    def common(self, setting: str) -> list[Condition]:
+        """Conditions of a setting that every room has: rooms taken together count by these alone."""
+        rooms = [set(self.conditions(setting, room)) for room in self.rooms]
+        return [one for one in self.conditions(setting) if all(one in conditions for conditions in rooms)]
 
     def centre(self, setting: str) -> Condition | None:
         """Condition in which the axes of a setting cross: the one that most others share noise or beams with.
