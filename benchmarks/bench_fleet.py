@@ -75,7 +75,7 @@ def row(name: str, fleet: Fleet, beside: Fleet | None = None) -> list[object]:
     apart = sum(pair["met"] is not None and pair["joined"] is None for pair in told["met"])
     return [
         name, *(worst(robots, error) for error in ("rmse", "online_rmse", "odometry_rmse")),
-        f"{max(late):.1f}" + (f", {apart} pairs never" if apart else ""), len(told["maps"]),
+        "-" if beside else f"{max(late):.1f}" + (f", {apart} pairs never" if apart else ""), len(told["maps"]),
         round(max(robot["bytes_per_second"] for robot in robots)),
         "-" if beside is None else f"{1e3 * off(fleet, beside):.1f}",
     ]  # fmt: skip

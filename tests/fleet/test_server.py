@@ -208,8 +208,10 @@ def test_what_no_keyframe_is_behind_is_told_as_a_fault_and_left_out(together: tu
 
     server = FleetServer()
     wrong = RelationFact(3, 4, np.zeros(3), np.eye(3), float("nan"), False)
-    server.push(encode(Report("one", 5, 0, (wrong,))))
+    server.push(encode(Report("three", 5, 0, (wrong,))))
     server.tick(0.0)
-    assert [fault.robot for fault in server.faults()] == ["one"]
+    assert [fault.robot for fault in server.faults()] == ["three"]
     assert "keyframe" in server.faults()[0].text
     assert server.common_maps() == ()
+    run(server, together[0].told)  # whose map is not compared with nothing
+    assert [shared.members[0][0] for shared in server.common_maps()] == ["one"]

@@ -230,7 +230,7 @@ class FleetServer:
         self._since.pop(common.number, None)
         if common.waiting:
             common.advance()
-            others = (other for other in self._commons.values() if other is not common)
+            others = (other for other in self._commons.values() if other is not common and len(other))
             self.search.hear(common, (other for other in others if self._site(other) == self._site(common)))
 
     def _site(self, common: CommonMap) -> str | None:
