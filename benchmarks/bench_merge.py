@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from time import process_time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.cli.run import DEFAULTS
-from contourslam.graph import GraphSlam, kept
 from contourslam.joining.building import keyframes_of
 from contourslam.joining.carrying import carry
 from contourslam.joining.chart import Chart
@@ -22,7 +22,9 @@ from contourslam.joining.joint import Joint
 from contourslam.joining.merging import Merged, merge_maps
 from contourslam.maps import SavedMap
 from contourslam.recordings import Message
-from contourslam.scan import LaserScan, Odometry
+from contourslam.replay import keep_map, make_mapper, replay
+from contourslam.slam.dense import dense_trajectory
+from contourslam.slam.mapper import Mapper
 from logs import Log, Track, find_logs
 from table import Table, publish
 
@@ -44,15 +46,15 @@ class Part:
 
 
 def mapped(messages: Sequence[Message]) -> Part:
-    slam, stamps = GraphSlam(DEFAULTS), []
-    for message in messages:
-        if isinstance(message, Odometry):
-            slam.push_odometry(message)
-        elif isinstance(message, LaserScan):
-            slam.push_scan(message)
-            stamps.append(message.stamp)
-    poses = slam.finish().poses
-    return Part((np.array(stamps), poses), kept(slam, {}))
+    """Map as `contourslam run` does: the trajectory has a pose at each odometry reading too."""
+    made: list[Mapper] = []
+
+    def make(*args: Any, **options: Any) -> Mapper:
+        made.append(make_mapper(*args, **options))
+        return made[-1]
+
+    result = replay(messages, DEFAULTS, make=make)
+    return Part(dense_trajectory(result), keep_map(made[-1], {}))
 
 
 def cut(messages: Sequence[Message], parts: int) -> list[list[Message]]:
