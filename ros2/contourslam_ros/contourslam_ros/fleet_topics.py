@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 REPORTS, ANSWERS = "/fleet/reports", "/fleet/answers"
 # Best effort: what is lost is known by its number and told again, so acknowledgements of the middleware would only be
-# told beside those of the fleet (a third more on the wire, BENCHMARK.md), and a server that is away fills no queue.
+# told beside those of the fleet, and a server that is away fills no queue.
 # Deep enough for what a robot tells after hours alone.
 QUALITY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
