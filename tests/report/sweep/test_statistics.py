@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from contourslam.report.sweep.figures import curves
 from contourslam.report.sweep.findings import of_all
 from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.reading import sweep_of
@@ -67,6 +68,8 @@ def test_rooms_count_together_by_what_all_of_them_have(sweep_rows) -> None:
     sweep = sweep_of(only)
     assert len(sweep.conditions("corners")) == len(sweep.conditions("corners", "furnished_room")) == 5
     assert [(one.noise, one.beams) for one in sweep.common("corners")] == [(0.01, 500)]
+    assert curves(sweep, POSITION, "furnished_room", "corners", "noise") is not None
+    assert curves(sweep, POSITION, "office_corridor", "corners", "noise") is None
 
 
 def test_the_wheels_are_those_of_each_drive_once(sweep_rows) -> None:

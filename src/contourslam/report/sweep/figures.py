@@ -54,14 +54,14 @@ class Curves:
 
 
 def curves(sweep: Sweep, measure: Measure, room: str, setting: str, axis: AxisName) -> Curves | None:
-    """Take a measure along an axis through the middle of the sweep; None where it was not varied, or is not known."""
+    """Take a measure along an axis through the middle of the sweep; None where the room has but one point on it."""
     centre = sweep.centre(setting)
     if centre is None:
         return None
     other: AxisName = "beams" if axis == "noise" else "noise"
     along = tuple(
         one
-        for one in sweep.conditions(setting)
+        for one in sweep.conditions(setting, room)
         if getattr(one, other) == getattr(centre, other) and getattr(one, axis) is not None
     )
     detectors = {
