@@ -1,6 +1,6 @@
 # Needs make, git and Python 3.11 or newer, no root. Every target sets up what it needs in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo table-one docs test test-docs test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot check clean
+.PHONY: help demo table-one docs test test-docs test-ros firmware test-firmware robot-in-the-loop bench bench-scale bench-ros bench-robot bench-many check clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -72,6 +72,10 @@ bench-ros: $(VENV_ROS)/.ready ## Measure the ROS 2 node beside a robot that is p
 
 bench-robot: $(VENV)/.dev firmware ## Measure the robot in the loop over five seeds with and without faults; 25 minutes on a quiet machine.
 	$(BIN)/python benchmarks/bench_robot.py --write
+
+bench-many: $(VENV)/.dev $(VENV_ROS)/.ready ## Measure joining, the fleet, its messages on the wire, and sweeps; an hour or so.
+	for name in joining fleet sweep; do $(BIN)/python benchmarks/bench_$$name.py --write || exit 1; done
+	$(VENV_ROS)/bin/python benchmarks/bench_fleet_wire.py --write
 
 clean: ## Remove everything that the other targets made, .venv included.
 	rm -rf $(VENV) $(VENV_ROS) .venv-peers site firmware/mega/build demo robot-in-the-loop out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
