@@ -21,7 +21,8 @@ from contourslam.cli.run import DEFAULTS
 from contourslam.fleet.channel import Air
 from contourslam.fleet.facts import Answer, Report
 from contourslam.fleet.inbox import Inbox
-from contourslam.fleet.play import Fleet, Player, play
+from contourslam.fleet.play import Fleet, play
+from contourslam.fleet.play_robot import Player
 from contourslam.fleet.reporter import Reporter
 from contourslam.fleet.server import FleetServer
 from contourslam.fleet.wire import decode, encode

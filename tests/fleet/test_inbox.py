@@ -12,7 +12,7 @@ from hypothesis.stateful import Bundle, RuleBasedStateMachine, invariant, precon
 
 from contourslam.errors import JournalError, MessageError
 from contourslam.fleet.facts import Answer, KeyframeFact, Report, Status
-from contourslam.fleet.inbox import AHEAD, AHEAD_BYTES, Inbox
+from contourslam.fleet.inbox import AHEAD, AHEAD_BYTES, TURNS, Inbox
 from contourslam.fleet.journal import Journal
 from contourslam.fleet.reporter_outbox import PATIENCE, Allowance, Outbox
 from contourslam.fleet.wire import encode
@@ -37,6 +37,12 @@ def numbers(inbox: Inbox, *messages: bytes) -> list[int]:
     return [told.number for data in messages for told in inbox.take(data).reports]
 
 
+def again(inbox: Inbox, folder: Path) -> Inbox:
+    """The server's program ends, and another one begins."""
+    inbox.close()
+    return Inbox(folder)
+
+
 class Fleet(RuleBasedStateMachine):
     """Two robots that tell, an air that loses, repeats and mixes, a server; robots and server may die at any time."""
 
@@ -51,6 +57,7 @@ class Fleet(RuleBasedStateMachine):
         self.acknowledged: dict[tuple[str, int], int] = {}
 
     def teardown(self) -> None:
+        self.inbox.close()
         shutil.rmtree(self.folder)
 
     @rule(name=st.sampled_from("ab"), points=st.integers(0, 3))
@@ -90,7 +97,7 @@ class Fleet(RuleBasedStateMachine):
     def answer(self, name: str) -> None:
         box = self.robots[name][-1]
         self.inbox.settle()
-        told = self.inbox.amend(Answer(name, box.run, 0, (), 0, (), -1, np.zeros(3), np.eye(3)))
+        told = Answer(name, box.run, *self.inbox.state((name, box.run)), 0, (), -1, np.zeros(3), np.eye(3))
         box.answered(told)
         self.acknowledged[name, box.run] = told.received
 
@@ -100,6 +107,7 @@ class Fleet(RuleBasedStateMachine):
         for path in self.folder.glob("*.facts"):
             with path.open("ab") as file:
                 file.write(bytes(torn))
+        self.inbox.close()
         self.inbox = Inbox(self.folder)
         assert bool(self.inbox.troubles) == bool(torn and list(self.folder.glob("*.facts")))
         self.got = {}
@@ -186,7 +194,52 @@ def test_a_report_that_cannot_be_kept_is_not_taken_and_is_taken_later(
     inbox.settle()
     assert inbox.state((ROBOT, 1)) == (1, (1,))
     assert numbers(inbox, report(1)) == [1, 2]
-    assert [told.number for told in Inbox(tmp_path).kept()] == [0, 1, 2]
+    assert [told.number for told in again(inbox, tmp_path).kept()] == [0, 1, 2]
+
+
+def test_a_disk_that_is_full_while_a_gap_closes_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox, add, tries = Inbox(tmp_path), Journal.add, iter(range(9))
+
+    def full_once(journal: Journal, data: bytes) -> None:
+        if next(tries) == 1:
+            raise JournalError("full")
+        add(journal, data)
+
+    assert numbers(inbox, report(0), report(2), report(3)) == [0]
+    monkeypatch.setattr(Journal, "add", full_once)
+    assert numbers(inbox, report(1)) == [1]
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (2, (2,))
+    assert numbers(inbox, report(2), report(3), report(4)) == [2, 3, 4]
+    assert [told.number for told in again(inbox, tmp_path).kept()] == [0, 1, 2, 3, 4]
+
+
+def test_a_second_server_on_the_same_folder_is_refused_until_the_first_one_ends(tmp_path: Path) -> None:
+    first = Inbox(tmp_path / "kept")
+    with pytest.raises(JournalError, match="kept: another server keeps its reports there"):
+        Inbox(tmp_path / "kept")
+    again(first, tmp_path / "kept")
+
+
+def test_two_files_of_one_run_are_refused_and_both_named(tmp_path: Path) -> None:
+    for name in ("1.facts", "2.facts"):
+        Journal(tmp_path / name).add(report(0))
+    with pytest.raises(JournalError, match=r"2\.facts: is of the same run as 1\.facts"):
+        Inbox(tmp_path)
+
+
+def test_a_folder_that_cannot_be_written_is_told_of_before_anything_comes(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(JournalError, match="cannot be"):
+        Inbox(tmp_path / "file")
+
+
+def test_messages_are_taken_while_the_disk_takes_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox = Inbox(tmp_path)
+    monkeypatch.setattr(Journal, "settle", lambda journal: inbox.take(report(1)))
+    inbox.take(report(0))
+    inbox.settle()
+    assert inbox.state((ROBOT, 1)) == (1, ())  # what came meanwhile is not acknowledged yet
 
 
 def test_another_content_under_the_same_number_is_a_fault_and_the_first_is_kept() -> None:
@@ -203,14 +256,34 @@ def test_another_content_under_the_same_number_is_a_fault_and_the_first_is_kept(
 
 def test_two_robots_of_one_name_that_drive_at_once_are_told_of() -> None:
     inbox = Inbox()
-    faults = [inbox.take(report(number, run, stamp=10.0 + number)).fault for number in range(6) for run in (1, 2)]
-    assert any("two drives at once" in fault for fault in faults)
+    faults = [inbox.take(status(number, run)).fault for number in range(1, 2 * TURNS) for run in (1, 2)]
+    assert "two drives at once" in faults[-1]
 
 
-def test_what_a_robot_told_before_its_restart_may_come_after_it() -> None:
-    inbox = Inbox()
-    inbox.take(report(0, 2, stamp=100.0))
-    assert [inbox.take(report(number, 1, stamp=50.0 + number)).fault for number in range(9)] == [""] * 9
+@pytest.mark.parametrize("began", [100.0, -100.0], ids=["later", "its clock was set back"])
+def test_a_robot_that_begins_anew_is_not_taken_for_two_whatever_comes_late_and_though_the_server_begins_anew(
+    tmp_path: Path, began: float
+) -> None:
+    inbox, faults = Inbox(tmp_path), []
+
+    def tell(number: int, run: int, stamp: float) -> None:
+        faults.append(inbox.take(report(number, run, stamp=stamp)).fault)
+
+    def say(count: int, run: int, stamp: float) -> None:
+        faults.append(inbox.take(status(count, run, stamp=stamp)).fault)
+
+    for number in range(5):
+        tell(number, 1, number)
+        say(number + 1, 1, number)
+    for number in range(20):
+        if number == 10:
+            inbox.close()
+            inbox = Inbox(tmp_path)
+        tell(number, 2, began + number)
+        say(number + 1, 2, began + number)
+        tell(5 + number, 1, 5.0 + number)  # what had waited
+        say(25, 1, 25.0)
+    assert faults == [""] * len(faults)
 
 
 def test_beyond_a_gap_only_so_much_is_held() -> None:
@@ -248,7 +321,7 @@ def test_runs_are_taken_up_in_the_order_in_which_they_came(tmp_path: Path) -> No
     inbox = Inbox(tmp_path)
     for robot in robots:
         inbox.take(encode(Report(robot, 5, 0, ())))
-    assert tuple(told.robot for told in Inbox(tmp_path).kept()) == robots
-    again = Inbox(tmp_path)
-    again.take(encode(Report("abel", 5, 0, ())))
-    assert tuple(told.robot for told in Inbox(tmp_path).kept()) == (*robots, "abel")
+    inbox = again(inbox, tmp_path)
+    assert tuple(told.robot for told in inbox.kept()) == robots
+    inbox.take(encode(Report("abel", 5, 0, ())))
+    assert tuple(told.robot for told in again(inbox, tmp_path).kept()) == (*robots, "abel")

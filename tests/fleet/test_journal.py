@@ -129,6 +129,18 @@ def test_a_disk_that_fails_is_told_of_before_anything_is_acknowledged(
         journal.settle()
 
 
+def test_the_name_of_a_new_file_is_on_the_disk_before_anything_is_acknowledged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settled = []
+    monkeypatch.setattr(module, "settle_folder", settled.append)
+    journal = written(tmp_path / "a.facts")
+    journal.add(b"x")
+    journal.settle()
+    written(tmp_path / "a.facts")
+    assert settled == [tmp_path]
+
+
 def test_a_kept_record_that_is_no_report_is_told_of(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="cannot read"):
         read_report(tmp_path, b"nonsense")

@@ -155,11 +155,13 @@ def test_a_server_that_starts_anew_loses_nothing_and_doubles_nothing(
 ) -> None:
     messages = merged(together)
     half = len(messages) // 2
-    first = FleetServer(inbox=Inbox(tmp_path))
+    inbox = Inbox(tmp_path)
+    first = FleetServer(inbox=inbox)
     for now, data in messages[:half]:
         first.push(data)
         first.tick(now)
     acknowledged = {(answer.robot, answer.received) for answer in first.answers()}
+    inbox.close()
     second = FleetServer(inbox=Inbox(tmp_path))
     assert {(answer.robot, answer.received) for answer in second.answers()} == acknowledged
     run(second, messages[half - 20 :])  # some that were acknowledged come again

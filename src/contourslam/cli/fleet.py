@@ -16,7 +16,7 @@ from contourslam.config import Config
 from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from contourslam.fleet.play import Message, Player
+    from contourslam.fleet.play_robot import Message, Player
     from contourslam.recordings import Recording
 
 
@@ -98,7 +98,7 @@ class Fleet:
     def _players(self, recordings: "list[Recording]", sources: "list[UntilStopped[Message]]") -> "list[Player]":
         import numpy as np
 
-        from contourslam.fleet.play import Player
+        from contourslam.fleet.play_robot import Player
 
         names, players = _names(self.recordings), []
         for number, (name, recording, messages) in enumerate(zip(names, recordings, sources, strict=True)):

@@ -1,21 +1,21 @@
 """The server's side: reports in any order, late, repeated or not at all, made into facts in order, each once; kept."""
 
 import itertools
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from contourslam.errors import JournalError
-from contourslam.fleet.facts import Answer, KeyframeFact, Report, Status
+from contourslam.fleet.facts import Report, Status
 from contourslam.fleet.journal import SUFFIX, Journal, journals, read_report
+from contourslam.fleet.journal_lock import Lock
 from contourslam.fleet.wire import checksum, decode
 
 Source = tuple[str, int]  # robot and run
 
 AHEAD, AHEAD_BYTES = 256, 1 << 20  # reports of a run, and bytes of them, that are held beyond a gap
 ASKED = 32  # missing reports that an answer names
-ALIVE = 3  # news of a run after another one of the same name began, from which on two robots share the name
+TURNS = 8  # times that runs of one name went on after each other, from which on two robots share the name
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +49,18 @@ class _Shelf:
     settled: int = 0  # as many are surely on the disk
     ahead: dict[int, tuple[Report, bytes]] = field(default_factory=dict)
     ahead_bytes: int = 0
-    told: int = 0  # as many there are, as far as the robot said
-    alive: int = 0  # news since a younger run of the same name began
+    told: int = 0  # as many there are, as far as is known
+    said: int = 0  # as many there are by its statuses
 
 
 class Inbox:
-    """What robots tell, put in order; changed in place. For one thread at a time.
+    """What robots tell, put in order; changed in place. For one thread at a time, but for :meth:`settle`.
 
     Parameters
     ----------
     folder : Path, optional
-        Where reports are kept; without it they are lost with the process, and acknowledged all the same.
+        Where reports are kept, by no other inbox at the same time; made where needed. Without it they are lost with the
+        process, and acknowledged all the same.
 
     Attributes
     ----------
@@ -69,18 +70,28 @@ class Inbox:
     Raises
     ------
     JournalError
-        If a file of the folder cannot be read, or is none.
+        If a file of the folder cannot be read, or is none, two are of one run, or another server has the folder.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
         self._shelves: dict[Source, _Shelf] = {}
-        self._youngest: dict[str, tuple[int, float]] = {}  # run of each robot that began last, and the stamp at which
+        self._turns: dict[str, tuple[int, int]] = {}  # run of each robot that went on last, and how often others did
         self.troubles: list[str] = []
         self._journals = 0  # numbers given to files
-        if folder is not None and folder.exists():
-            for path in journals(folder):
-                self._recall(path)
+        self._lock = None if folder is None else Lock(folder)
+        if folder is not None:
+            try:
+                for path in journals(folder):
+                    self._recall(path)
+            except JournalError:
+                self.close()
+                raise
+
+    def close(self) -> None:
+        """Let another inbox have the folder, as the end of the process does; this one is not to be used again."""
+        if self._lock is not None:
+            self._lock.release()
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -123,7 +134,7 @@ class Inbox:
         message = decode(data)
         source = message.robot, message.run
         if isinstance(message, Status):
-            return Taken(source, status=message, fault=self._hear(source, message.reports, message.stamp))
+            return Taken(source, status=message, fault=self._hear(message))
         if not isinstance(message, Report):
             return Taken(source, fault="an answer, which only a server sends; are there two?")
         shelf = self._shelf(source)
@@ -131,27 +142,30 @@ class Inbox:
         before = self._checksum(shelf, number)
         if before is not None:
             return Taken(source, fault="" if before == checksum(data) else _doubled(message))
-        stamp = max((fact.stamp for fact in message.facts if isinstance(fact, KeyframeFact)), default=-math.inf)
+        shelf.told = max(shelf.told, number + 1)
         if number > len(shelf.checksums):
             if number < len(shelf.checksums) + AHEAD and shelf.ahead_bytes + len(data) <= AHEAD_BYTES:
                 shelf.ahead[number] = message, data
                 shelf.ahead_bytes += len(data)
-            return Taken(source, fault=self._hear(source, number + 1, stamp))
-        return Taken(source, self._follow(shelf, message, data), fault=self._hear(source, number + 1, stamp))
+            return Taken(source)
+        return Taken(source, self._follow(shelf, message, data))
 
     def settle(self) -> None:
-        """Make sure that what was taken is on the disk; only that is acknowledged.
+        """Make sure that what was taken before is on the disk; only that is acknowledged.
+
+        The disk may take its time: another thread may go on with all else meanwhile.
 
         Raises
         ------
         JournalError
             If the disk fails.
         """
-        for shelf in self._shelves.values():
-            if shelf.settled < len(shelf.checksums):
+        for shelf in list(self._shelves.values()):
+            until = len(shelf.checksums)
+            if shelf.settled < until:
                 if shelf.journal is not None:
                     shelf.journal.settle()
-                shelf.settled = len(shelf.checksums)
+                shelf.settled = max(shelf.settled, until)
 
     def state(self, source: Source) -> tuple[int, tuple[int, ...]]:
         """Tell what to answer a run.
@@ -170,11 +184,6 @@ class Inbox:
         missing = (n for n in range(first, min(until, first + AHEAD)) if n not in shelf.ahead)
         return shelf.settled, tuple(itertools.islice(missing, ASKED))
 
-    def amend(self, answer: Answer) -> Answer:
-        """Give an answer with what of the run's reports is kept, and what is missing."""
-        received, missing = self.state((answer.robot, answer.run))
-        return replace(answer, received=received, missing=missing)
-
     def _follow(self, shelf: _Shelf, report: Report, data: bytes) -> tuple[Report, ...]:
         """Keep the next report, and those that have waited for it."""
         if self._folder is not None and shelf.journal is None:
@@ -186,12 +195,12 @@ class Inbox:
         out = [report]
         while (waiting := shelf.ahead.get(len(shelf.checksums))) is not None:
             report, data = waiting
+            del shelf.ahead[report.number]
+            shelf.ahead_bytes -= len(data)
             try:
                 self._keep(shelf, data)
-            except JournalError:  # the first one is kept; this one goes on waiting
+            except JournalError:  # the first one is kept; this one is missing, and so will be asked for
                 break
-            shelf.ahead.pop(report.number)
-            shelf.ahead_bytes -= len(data)
             out.append(report)
         return tuple(out)
 
@@ -211,22 +220,27 @@ class Inbox:
         shelf = self._shelves.get(source)
         if shelf is None:
             shelf = self._shelves[source] = _Shelf(None)
-            self._youngest[source[0]] = source[1], math.inf
         return shelf
 
-    def _hear(self, source: Source, reports: int, stamp: float) -> str:
-        """Take in how many reports a run has; tell of two robots that share a name."""
-        shelf, (robot, run) = self._shelf(source), source
-        news, shelf.told = reports > shelf.told, max(shelf.told, reports)
-        youngest, began = self._youngest.setdefault(robot, (run, math.inf))
-        if run == youngest:
-            self._youngest[robot] = run, min(began, stamp if stamp > -math.inf else began)
-        if run == youngest or not news or stamp <= began:  # what an older run saw before that may come late
+    def _hear(self, status: Status) -> str:
+        """Take in how many reports a run has; tell of two robots that share a name.
+
+        Of one robot's runs only the last one goes on; what is still to be sent of those before it does not make them
+        longer, and statuses that overtake each other do so a few times. The robot's clock says nothing: it may have
+        been set back.
+        """
+        robot, run = status.robot, status.run
+        shelf = self._shelf((robot, run))
+        before, shelf.said = shelf.said, max(shelf.said, status.reports)
+        shelf.told = max(shelf.told, status.reports)
+        if shelf.said == before:
             return ""
-        shelf.alive += 1
-        if shelf.alive < ALIVE:
+        last, turns = self._turns.get(robot, (run, 0))
+        turns += last != run and before > 0
+        self._turns[robot] = run, turns
+        if turns < TURNS:
             return ""
-        return f"{source[0]} tells of two drives at once: two robots have this name; give one of them another"
+        return f"{robot} tells of two drives at once: two robots have this name; give one of them another"
 
     def _recall(self, path: Path) -> None:
         """Take in what was kept of one run."""
@@ -243,6 +257,8 @@ class Inbox:
             source = report.robot, report.run
             shelf.checksums.append(checksum(data))
         if source is not None:
+            if (other := self._shelves.get(source)) is not None and other.journal is not None:
+                raise JournalError(f"{path}: is of the same run as {other.journal.path.name}; move one elsewhere")
             shelf.settled = shelf.told = len(shelf.checksums)
             self._shelves[source] = shelf
 

@@ -43,9 +43,10 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self.path, self.trouble = path, ""
-        self._end, self._settled = 0, True  # where what is whole ends; whether the disk surely has it
+        self._end = 0  # where what is whole ends
         if path.exists():
             self._end = self._sound()
+        self._settled = self._end  # as many bytes the disk surely has
 
     def reports(self) -> Iterator[bytes]:
         """Read all reports, in the order in which they were added.
@@ -87,24 +88,26 @@ class Journal:
                 f"{self.path}: cannot be written ({reason}); free space, nothing more is acknowledged until then"
             ) from error
         self._end += len(beginning) + len(record)
-        self._settled = False
 
     def settle(self) -> None:
-        """Wait until the disk has everything.
+        """Wait until the disk has everything that was added before; another thread may go on adding meanwhile.
 
         Raises
         ------
         JournalError
             If the disk fails.
         """
-        if self._settled:
+        until = self._end
+        if self._settled == until:
             return
         try:
             with self.path.open("rb") as file:
                 os.fsync(file.fileno())
+            if not self._settled:
+                settle_folder(self.path.parent)
         except OSError as error:
             raise JournalError(f"{self.path}: the disk fails ({error.strerror or error}); do not trust it") from error
-        self._settled = True
+        self._settled = until
 
     def _cut(self) -> None:
         """Take back what was written by half; where that fails too, the next one to open the file does it."""
@@ -143,6 +146,23 @@ class Journal:
             f"{self.path}: the last {size - end} bytes are no whole report, as after a crash; they are in "
             f"{beside.name} now, and the robot is asked for what is missing"
         )
+
+
+def settle_folder(folder: Path) -> None:
+    """Wait until the disk has a folder's names, else a power cut may lose a file that was made in it.
+
+    Raises
+    ------
+    OSError
+        If the disk fails.
+    """
+    if os.name == "nt":  # which opens no folders
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _write(file: FileIO, data: bytes) -> None:

@@ -119,10 +119,9 @@ def measure(
                 answered = now
                 inbox.settle()
                 last = slam.memory.keyframes[-1]
-                answer = Answer(
-                    "robot1", 1, 0, (), 1, ("robot1",), len(slam.memory.keyframes) - 1, last.local, np.eye(3)
-                )
-                answer = inbox.amend(answer)
+                known = inbox.state(("robot1", 1))
+                key = len(slam.memory.keyframes) - 1
+                answer = Answer("robot1", 1, *known, 1, ("robot1",), key, last.local, np.eye(3))
                 other, count = other + len(encode(answer)), count + 1
                 reporter.answered(answer)
     seconds = now
@@ -131,7 +130,8 @@ def measure(
         now += 1.0
         carry()
         inbox.settle()
-        reporter.answered(inbox.amend(Answer("robot1", 1, 0, (), 1, (), -1, np.zeros(3), np.zeros((3, 3)))))
+        known = inbox.state(("robot1", 1))
+        reporter.answered(Answer("robot1", 1, *known, 1, (), -1, np.zeros(3), np.zeros((3, 3))))
     keyframes = [fact for fact in facts if isinstance(fact, KeyframeFact)]
     return Traffic(
         seconds, scans, beams, len(keyframes), sum(len(fact.points) for fact in keyframes),

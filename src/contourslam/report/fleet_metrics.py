@@ -10,7 +10,8 @@ import numpy as np
 from contourslam.contour.contours import Floats
 from contourslam.evaluation.fleet import fit, met, rmse
 from contourslam.fleet.common import Joined
-from contourslam.fleet.play import Fleet, Played
+from contourslam.fleet.play import Fleet
+from contourslam.fleet.play_robot import Played
 from contourslam.fleet.server import Shared
 from contourslam.geometry.poses import between, compose
 
