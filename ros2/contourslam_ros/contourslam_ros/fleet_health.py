@@ -1,5 +1,6 @@
 """How the fleet is, in a few lines: who speaks, who does not, what was joined and why, and what could not be used."""
 
+import threading
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -22,22 +23,44 @@ class Voice:
     packets: Rate = field(default_factory=lambda: Rate(REMEMBER))
     sizes: deque[tuple[float, int]] = field(default_factory=deque)
 
+    def hear(self, size: int, now: float) -> None:
+        """Count a packet."""
+        self.last = now
+        self.packets.count(now, now)
+        self.sizes.append((now, size))
+        self._forget(now)
+
     def speed(self, now: float) -> float:
         """Bytes a second of late, without what the network adds."""
-        while self.sizes and self.sizes[0][0] < now - REMEMBER:
-            self.sizes.popleft()
+        self._forget(now)
         return sum(size for _, size in self.sizes) / REMEMBER
 
+    def _forget(self, now: float) -> None:
+        while self.sizes and self.sizes[0][0] < now - REMEMBER:
+            self.sizes.popleft()
 
-class FleetHealth:
-    """What the diagnostics of the server are made of; changed in place by one thread, and asked by any.
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What a server says of its fleet.
 
     Attributes
     ----------
-    refused : int
-        Packets that could not be used, from the beginning on.
-    trouble : str
-        Why nothing can be kept; empty where it can.
+    answers : tuple of Answer
+        To every run.
+    joined : tuple of Joined
+    waiting, given_up : int
+        Views that are still to be looked for, and that never will.
+    """
+
+    answers: tuple[Answer, ...] = ()
+    joined: tuple[Joined, ...] = ()
+    waiting: int = 0
+    given_up: int = 0
+
+
+class FleetHealth:
+    """What the diagnostics of the server are made of; changed in place, told and asked from any thread.
 
     Parameters
     ----------
@@ -49,56 +72,68 @@ class FleetHealth:
 
     def __init__(self, topic: str, silent_after: float) -> None:
         self._topic, self._silent_after = topic, silent_after
+        self._lock = threading.Lock()  # held for moments; all that follows is changed and read under it
         self._voices: dict[Name, Voice] = {}
         self._rubbish: deque[tuple[float, str]] = deque()
-        self.refused, self.trouble = 0, ""
+        self._refused, self._trouble = 0, ""
+        self._kept: int | None = None  # reports, once they were counted since the last trouble
 
     def hear(self, name: Name, size: int, now: float) -> None:
         """Count a packet of a robot's run."""
-        voice = self._voices.setdefault(name, Voice(now))
-        voice.last = now
-        voice.packets.count(now, now)
-        voice.sizes.append((now, size))
+        with self._lock:
+            self._voices.setdefault(name, Voice(now)).hear(size, now)
 
     def refuse(self, why: str, now: float) -> None:
         """Count a packet that cannot be used."""
-        self.refused += 1
-        self._rubbish.append((now, why))
+        with self._lock:
+            self._refused += 1
+            self._rubbish.append((now, why))
+
+    def fail(self, why: str) -> None:
+        """Take in that nothing can be kept."""
+        with self._lock:
+            self._trouble, self._kept = why, None
+
+    def keep(self, reports: int) -> None:
+        """Take in how many reports are kept: only where more are after a trouble is it over."""
+        with self._lock:
+            if self._kept is not None and reports > self._kept:
+                self._trouble = ""
+            self._kept = reports
 
     def heard_since(self, name: Name, then: float) -> bool:
         """Whether a run has spoken since."""
-        voice = self._voices.get(name)
-        return voice is not None and voice.last >= then
+        with self._lock:
+            voice = self._voices.get(name)
+            return voice is not None and voice.last >= then
 
-    def diagnostics(
-        self, answers: Sequence[Answer], joined: Sequence[Joined], faults: Sequence[Fault], now: float
-    ) -> tuple[Diagnostic, ...]:
+    def diagnostics(self, state: State, faults: Sequence[Fault], now: float) -> tuple[Diagnostic, ...]:
         """Say how all is.
 
         Parameters
         ----------
-        answers : sequence of Answer
-            To every run.
-        joined : sequence of Joined
+        state : State
         faults : sequence of Fault
         now : float
             s.
         """
-        return (
-            self._messages(now),
-            self._robots(answers, now),
-            *self._each(answers, now),
-            _joints(joined),
-            _faults(faults),
-        )
+        with self._lock:
+            return (
+                self._messages(now),
+                self._robots(state.answers, now),
+                *self._each(state.answers, now),
+                _joints(state.joined),
+                _search(state),
+                _faults(faults),
+            )
 
     def _messages(self, now: float) -> Diagnostic:
         while self._rubbish and self._rubbish[0][0] < now - REMEMBER:
             self._rubbish.popleft()
-        rate = sum(voice.packets.by_arrival(now) for voice in list(self._voices.values()))
-        values = {"topic": self._topic, "a second": f"{rate:.2f}", "refused": str(self.refused)}
-        if self.trouble:
-            return Diagnostic(Level.ERROR, "messages", f"nothing is acknowledged: {self.trouble}", values)
+        rate = sum(voice.packets.by_arrival(now) for voice in self._voices.values())
+        values = {"topic": self._topic, "a second": f"{rate:.2f}", "refused": str(self._refused)}
+        if self._trouble:
+            return Diagnostic(Level.ERROR, "messages", f"nothing is acknowledged: {self._trouble}", values)
         if self._rubbish:
             why = f"{len(self._rubbish)} refused in the last {REMEMBER:.0f} s, the last: {self._rubbish[-1][1]}"
             return Diagnostic(Level.WARN, "messages", why, values)
@@ -110,7 +145,7 @@ class FleetHealth:
         values = {"robots": str(len(names)), "runs": str(len(answers)), "common maps": str(len(maps))}
         if not names:
             return Diagnostic(Level.OK, "robots", f"no robot has spoken yet on {self._topic}", values)
-        last = {name: voice.last for name, voice in list(self._voices.items())}
+        last = {name: voice.last for name, voice in self._voices.items()}
         speaking = Counter(robot for (robot, _), when in last.items() if when > now - REMEMBER / 2.0)
         twice = sorted(robot for robot, count in speaking.items() if count > 1)
         if twice:
@@ -169,6 +204,15 @@ def _joints(joined: Sequence[Joined]) -> Diagnostic:
             f"rival {e.rival:.2f}"
         )
     return Diagnostic(Level.OK, "joints", f"{_number(len(joined), 'joint')} found", values)
+
+
+def _search(state: State) -> Diagnostic:
+    """Say whether the server keeps up with looking for joints."""
+    values = {"waiting": str(state.waiting), "given up": str(state.given_up)}
+    if state.given_up:
+        text = f"{_number(state.given_up, 'view')} given up: more come than can be looked for; give the robots sites"
+        return Diagnostic(Level.WARN, "search", text, values)
+    return Diagnostic(Level.OK, "search", f"{_number(state.waiting, 'view')} to be looked for", values)
 
 
 def _faults(faults: Sequence[Fault]) -> Diagnostic:

@@ -3,6 +3,8 @@
 import math
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Self
 
 import rclpy
@@ -28,9 +30,11 @@ from contourslam_ros.messages import header, pose_message, transform_message
 from contourslam_ros.settings import NodeConfig
 
 TURN = 0.2  # s between two looks whether something is to be sent
+PERIOD = 2.0  # s between two reports, and between two statuses: more often would cost more than 2 kB/s on the wire
 QUIET = 2.0  # s without a scan after which a robot is taken to stand still
-AWAY = 5.0  # s without an answer after which there is no server
-LAST_WORDS = 2.0  # s that a node which ends waits at most for the server to have all
+AWAY = 8.0  # s without an answer after which there is no server
+TOLD = 10.0  # s for which it is said that something could not be told
+LAST_WORDS = 4.0  # s that a node which ends waits at most for the server to have all
 
 
 class FleetLink:
@@ -54,13 +58,13 @@ class FleetLink:
 
     def __init__(self, node: Node, config: NodeConfig, live: LiveConfig) -> None:
         self._node, self._config = node, config
-        self._reporter = Reporter(config.fleet)
+        self._reporter = Reporter(config.fleet, period=PERIOD)
         self._session: Session | None = None
         self._lock = threading.Lock()  # held while the next two are asked or changed
         self._smoother, self._common = Smoother(live), 0
         self._answer: Answer | None = None
         self._heard, self._trouble = -math.inf, ""
-        self._failure = ""
+        self._failures, self._failure, self._failed = 0, "", -math.inf
         self._taken = math.inf  # when the last scan was taken in
         self.stamp = Time()
 
@@ -80,20 +84,18 @@ class FleetLink:
 
     def take(self, processed: Processed) -> None:
         """Tell what a scan has added, and publish where the robot is in the common map."""
-        if self._session is None or self._failure:
-            return
-        try:
-            self._session.inspect(lambda mapper: self._look(mapper, processed))
-        except Exception as error:  # a fleet must not end the mapping
-            self._failure = repr(error)
-            self._node.get_logger().error(f"the fleet is told no more: {error!r}")
+        session = self._session
+        if session is not None:
+            with self._spared():
+                session.inspect(lambda mapper: self._look(mapper, processed))
 
     def rest(self) -> None:
         """Tell the last of it where no more scans come: else that would wait for the next one."""
         now = time.monotonic()
-        if now > self._taken + QUIET and not self._failure:
+        if now > self._taken + QUIET:
             self._taken = math.inf
-            self._reporter.flush(now)
+            with self._spared():
+                self._reporter.flush(now)
 
     def _look(self, mapper: Mapper, processed: Processed) -> None:
         assert self._session is not None
@@ -114,6 +116,15 @@ class FleetLink:
 
     # In any thread.
 
+    @contextmanager
+    def _spared(self) -> Iterator[None]:
+        """Let mapping and node go on, and tell the fleet what comes next, whatever could not be told."""
+        try:
+            yield
+        except Exception as error:
+            self._failures, self._failure, self._failed = self._failures + 1, repr(error), time.monotonic()
+            self._node.get_logger().error(f"the fleet is not told all: {error!r}", throttle_duration_sec=TOLD)
+
     def transform(self, stamp: Time) -> TransformStamped | None:
         """Give the transform from the common map to the robot's own; None before it is known."""
         with self._lock:
@@ -133,9 +144,10 @@ class FleetLink:
             "waiting": str(waiting),
             "common map": "" if answer is None else str(answer.common),
             "members": "" if answer is None else ", ".join(answer.members),
+            "failures": str(self._failures),
         }
-        if self._failure:
-            return Diagnostic(Level.ERROR, "fleet", f"the fleet is told no more: {self._failure}", values)
+        if time.monotonic() - self._failed < TOLD:
+            return Diagnostic(Level.ERROR, "fleet", f"the fleet is not told all: {self._failure}", values)
         if self._trouble:
             return Diagnostic(Level.WARN, "fleet", f"an answer cannot be read: {self._trouble}", values)
         if time.monotonic() - self._heard > AWAY:
@@ -154,15 +166,17 @@ class FleetLink:
 
     def finish(self) -> None:
         """Tell what has not been told yet, and wait a moment for the server to have it; the mapping has ended."""
-        self._reporter.flush(time.monotonic())
+        with self._spared():
+            self._reporter.flush(time.monotonic())
         end = time.monotonic() + LAST_WORDS
         while not self._reporter.settled and self._heard > end - LAST_WORDS - AWAY and time.monotonic() < end:
             rclpy.spin_once(self._node, timeout_sec=TURN)
 
     def _send(self) -> None:
         if self._reports.get_subscription_count():  # else all waits
-            for data in self._reporter.due(time.monotonic()):
-                self._reports.publish(packet(data))
+            with self._spared():
+                for data in self._reporter.due(time.monotonic()):
+                    self._reports.publish(packet(data))
 
     def _take_answer(self, message: FleetPacket) -> None:
         try:

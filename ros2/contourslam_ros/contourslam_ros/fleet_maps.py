@@ -14,6 +14,7 @@ from contourslam.fleet.facts import Answer
 from contourslam.fleet.server import FleetServer
 from contourslam_ros.fleet_drawing import drives, fleet_markers, way_message
 from contourslam_ros.fleet_settings import FleetConfig
+from contourslam_ros.fleet_topics import in_topic
 from contourslam_ros.map_sender import LATCHED
 from contourslam_ros.messages import header, landmark_message
 
@@ -49,7 +50,8 @@ class FleetMaps:
                 topic = f"/fleet/map_{answer.common}/landmarks"
                 self._landmarks[answer.common] = self._node.create_publisher(LandmarkMap, topic, LATCHED)
             if answer.robot not in self._ways:
-                self._ways[answer.robot] = self._node.create_publisher(Path, f"/fleet/way/{answer.robot}", LATCHED)
+                topic = f"/fleet/way/{in_topic(answer.robot)}"
+                self._ways[answer.robot] = self._node.create_publisher(Path, topic, LATCHED)
 
     def send(self, server: FleetServer, answers: Sequence[Answer]) -> None:
         """Send what has changed since to those who listen; drawn up only then.

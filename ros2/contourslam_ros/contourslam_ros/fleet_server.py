@@ -16,13 +16,11 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 
 from contourslam.errors import ContourslamError, JournalError, MessageError
-from contourslam.fleet.common import Joined
-from contourslam.fleet.facts import Answer
 from contourslam.fleet.inbox import Inbox
 from contourslam.fleet.server import FleetServer
 from contourslam.fleet.wire import encode
 from contourslam.maps.file import save_map
-from contourslam_ros.fleet_health import FleetHealth
+from contourslam_ros.fleet_health import FleetHealth, State
 from contourslam_ros.fleet_maps import FleetMaps
 from contourslam_ros.fleet_rehearsal import rehearse
 from contourslam_ros.fleet_settings import FleetConfig
@@ -55,13 +53,12 @@ class Server(Node):
         super().__init__("fleet_server")
         self.config = declare(self, FleetConfig())
         self.failure: BaseException | None = None
-        self._server = FleetServer(inbox=Inbox(self.config.path))
+        self._server = FleetServer(inbox=Inbox(self.config.path), sites=self.config.sites_of_robots())
         self._health = FleetHealth(REPORTS, self.config.silent_after)
         self._packets: deque[tuple[bytes, float]] = deque(maxlen=MOST_WAITING)
         self._answers: dict[str, Publisher] = {}
         self._answered = 0.0
-        self._said: tuple[Answer, ...] = ()
-        self._joined: tuple[Joined, ...] = ()
+        self._state = State()
         self._jobs: deque[tuple[Callable[[], str], Future]] = deque()
         self._news, self._ending = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="fleet", daemon=True)
@@ -100,9 +97,10 @@ class Server(Node):
 
     def _offer(self) -> None:
         """Have the topics that are spoken on; in this thread, whose executor looks through what the node has."""
-        for robot in {answer.robot for answer in self._said} - set(self._answers):
+        said = self._state.answers
+        for robot in {answer.robot for answer in said} - set(self._answers):
             self._answers[robot] = self.create_publisher(FleetPacket, answers_to(robot), QUALITY)
-        self._maps.offer(self._said)
+        self._maps.offer(said)
 
     # In the thread that works.
 
@@ -116,10 +114,9 @@ class Server(Node):
                 self._server.tick(began, self.config.tick_period)
                 if len(self._server.search):
                     self._news.set()
-                self._joined = self._server.joined()
                 self._work()
                 self._answer()
-                self._maps.send(self._server, self._said)
+                self._maps.send(self._server, self._state.answers)
                 self._ending.wait(max(0.0, began + self.config.tick_period - time.monotonic()))
         except BaseException as error:  # nobody else hears of it in a thread
             self.failure = error
@@ -131,7 +128,7 @@ class Server(Node):
             try:
                 source = self._server.push(data)
             except JournalError as error:  # it is not acknowledged, so the robot tells it again
-                self._health.trouble = str(error)
+                self._health.fail(str(error))
             except MessageError as error:
                 self._health.refuse(str(error), came)
             else:
@@ -144,12 +141,14 @@ class Server(Node):
             return
         since, self._answered = self._answered, now
         try:
-            self._said = self._server.answers()
+            said = self._server.answers()
         except JournalError as error:
-            self._health.trouble = str(error)
+            self._health.fail(str(error))
             return
-        self._health.trouble = ""
-        for answer in self._said:
+        self._health.keep(sum(answer.received for answer in said))
+        search = self._server.search
+        self._state = State(said, self._server.joined(), len(search), search.given_up)
+        for answer in said:
             if answer.robot in self._answers and self._health.heard_since((answer.robot, answer.run), since):
                 self._answers[answer.robot].publish(packet(encode(answer)))
 
@@ -182,7 +181,7 @@ class Server(Node):
 
     def _send_diagnostics(self) -> None:
         head = header(self.get_clock().now().to_msg(), "")
-        told = self._health.diagnostics(self._said, self._joined, self._server.faults(), time.monotonic())
+        told = self._health.diagnostics(self._state, self._server.faults(), time.monotonic())
         self._diagnostics.publish(diagnostic_message(head, self.get_fully_qualified_name(), told))
 
 

@@ -20,18 +20,23 @@ from contourslam_ros.launching import SHARE
 def generate_launch_description() -> LaunchDescription:
     """Say what is started."""
     simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
-    folder = ParameterValue(LaunchConfiguration("folder"), value_type=str)
+    folder, sites = (ParameterValue(LaunchConfiguration(name), value_type=str) for name in ("folder", "sites"))
     picture = PathJoinSubstitution([SHARE, "rviz", "fleet.rviz"])
     return LaunchDescription(
         [
             DeclareLaunchArgument("folder", description="Where what the robots told is kept, and taken up again."),
+            DeclareLaunchArgument(
+                "sites",
+                default_value="",
+                description="Where robots drive that cannot meet: robot1:ground,robot2:first.",
+            ),
             DeclareLaunchArgument("use_sim_time", default_value="false", description="Time comes from /clock."),
             DeclareLaunchArgument("rviz", default_value="false", description="Start RViz too."),
             Node(
                 package="contourslam_ros",
                 executable="fleet_server",
                 output="screen",
-                parameters=[{"folder": folder, "use_sim_time": simulated}],
+                parameters=[{"folder": folder, "sites": sites, "use_sim_time": simulated}],
             ),
             Node(
                 package="rviz2",
