@@ -8,7 +8,7 @@ import numpy as np
 
 from contourslam.contour.contours import Floats
 from contourslam.fleet.common_kept import Bond, assemble
-from contourslam.fleet.runs import Run
+from contourslam.fleet.runs import Identity, Run
 from contourslam.geometry.poses import between_one, compose, compose_one
 from contourslam.graph.places import ROBUST_TIES, Keyframe, Place, Places
 from contourslam.graph.pose_graph import PoseGraph
@@ -88,8 +88,8 @@ class CommonMap:
         self._poses: list[Floats] = []  # as they were when last asked for
         self._bonds: list[Bond] = []
         self._found: list[Bond] = []  # ties that enter the graph with the next keyframes
-        self._bound: dict[Run, int] = {}  # relations and stretches of each run that are in
-        self._stretched: dict[Run, int] = {}
+        self._stretched: dict[Run, int] = {}  # stretches of each run that are in
+        self._known: dict[Identity, int] = {}
         self._tied_at: dict[Run, float] = {}
         self._refresh_due = 0
 
@@ -103,8 +103,8 @@ class CommonMap:
 
     @property
     def waiting(self) -> int:
-        """Keyframes that are told of and not yet placed."""
-        return sum(len(run.keyframes) - len(run.keys) for run in self.runs)
+        """Keyframes that can be placed and are not yet."""
+        return sum(self._reach(run) - len(run.keys) for run in self.runs)
 
     @property
     def due(self) -> bool:
@@ -136,17 +136,28 @@ class CommonMap:
         """Give each new keyframe its number here and the pose that its own run tells."""
         begin = len(self)
         for run in self.runs:
-            for number in range(len(run.keys), len(run.keyframes)):
-                key = len(self)
+            for number in range(len(run.keys), self._reach(run)):
+                identity, key = run.identities[number], len(self)
+                known = None if identity is None else self._known.setdefault(identity, key)
+                if known is not None and known != key:
+                    run.place(known, again=True)
+                    continue
                 self._poses.append(self._guess(run, number, begin))
                 self._keyframes.append(run.as_keyframe(number))
                 self.owners.append((run, number))
-                run.keys.append(key)
+                run.place(key, again=False)
         for key in range(begin, len(self)):
             self._graph.add(key, self._poses[key])
         if begin == 0 and len(self):
             self._graph.fix(0, self._poses[0], START)
         return list(range(begin, len(self)))
+
+    def _reach(self, run: Run) -> int:
+        """How many keyframes of a run have a place: the first of all, those known from elsewhere, what is bound."""
+        if len(run.keys) == len(run.keyframes):
+            return len(run.keys)
+        empty = not len(self)
+        return run.reach(lambda number: (empty and number == 0) or run.identities[number] in self._known)
 
     def _guess(self, run: Run, number: int, settled: int) -> Floats:
         if number == 0:
@@ -159,11 +170,15 @@ class CommonMap:
     def _bind(self) -> None:
         """Let the runs' own relations, and the ties found since, enter the graph."""
         for run in self.runs:
-            for fact in run.relations[self._bound.get(run, 0) :]:
+            waiting, run.relations = run.relations, []
+            for fact in waiting:
+                if max(fact.first, fact.second) >= len(run.keys):
+                    run.relations.append(fact)
+                    continue
                 robust = None if math.isnan(fact.robust) else fact.robust
                 first, second = run.keys[fact.first], run.keys[fact.second]
-                self._relate(Bond(first, second, fact.pose, fact.information, robust, fact.tie))
-            self._bound[run] = len(run.relations)
+                if first not in run.again or second not in run.again:  # else the run before has told it
+                    self._relate(Bond(first, second, fact.pose, fact.information, robust, fact.tie))
         for bond in self._found:
             self._relate(bond)
         self._found = []
@@ -180,10 +195,13 @@ class CommonMap:
         """Take in the stretches that are finished."""
         for run in self.runs:
             for fact in run.stretches[self._stretched.get(run, 0) :]:
-                anchor = run.keys[fact.anchor]
-                members = tuple(run.keys[number] for number in fact.members)
-                self._places.put(Place(anchor, members, fact.seen, 0), self._graph.pose(anchor))
-            self._stretched[run] = len(run.stretches)
+                if max(fact.anchor, *fact.members) >= len(run.keys):
+                    break
+                self._stretched[run] = self._stretched.get(run, 0) + 1
+                if run.adds(fact):
+                    anchor = run.keys[fact.anchor]
+                    members = tuple(run.keys[number] for number in fact.members)
+                    self._places.put(Place(anchor, members, fact.seen, 0), self._graph.pose(anchor))
 
     def refresh(self) -> None:
         """Ask the graph anew where everything is."""
@@ -200,7 +218,7 @@ class CommonMap:
         pose, tried = self._poses[key], 0
         for place in self._places.near(pose, len(self._places), REACH)[0].tolist():
             anchor = self._places.list[place].anchor
-            if self.owners[anchor][0] is run:
+            if self.owners[anchor][0] is run or anchor in run.again:  # the robot itself ties to its own places
                 continue
             guess = between_one(self._graph.pose(anchor), pose)
             found = align(self._keyframes[key].oriented, self._places.cells(place), guess, PRIOR)
@@ -235,7 +253,10 @@ class CommonMap:
         self.runs += other.runs
         for run in other.runs:
             run.keys[:] = [key + offset for key in run.keys]
-            self._bound[run], self._stretched[run] = other._bound.get(run, 0), other._stretched.get(run, 0)
+            run.again = {key + offset for key in run.again}
+            self._stretched[run] = other._stretched.get(run, 0)
+        for identity, key in other._known.items():
+            self._known.setdefault(identity, key + offset)
         for bond in (*other._bonds, *other._found):
             self._relate(replace(bond, first=bond.first + offset, second=bond.second + offset))
         for tie in joint.ties:
@@ -259,7 +280,7 @@ class CommonMap:
         Only keyframes that are placed are in it, and of their poses no covariance.
         """
         self.refresh()
-        order = [key for run in self.runs for key in run.keys]
+        order = [run.keys[number] for run in self.runs for number in run.own]
         return assemble(self.runs, np.array(self._poses).reshape(-1, 3), order, self._bonds), order
 
     def begin_anew(self, saved: SavedMap, order: Sequence[int]) -> None:

@@ -54,7 +54,7 @@ def assemble(runs: Sequence[Run], poses: Floats, order: Sequence[int], bonds: Se
     """
     index = np.empty(len(order), np.int64)
     index[list(order)] = np.arange(len(order))
-    facts = [run.keyframes[number] for run in runs for number in range(len(run.keys))]
+    facts = [run.keyframes[number] for run in runs for number in run.own]
     sightings = Sightings()
     for key, fact in enumerate(facts):
         sightings.append(key, fact.seen)
@@ -80,7 +80,7 @@ def assemble(runs: Sequence[Run], poses: Floats, order: Sequence[int], bonds: Se
 
 
 def _drives(runs: Sequence[Run]) -> Ints:
-    begun = [number in run.begins for run in runs for number in range(len(run.keys))]
+    begun = [number == begin for run in runs for begin, end in run.pieces for number in range(begin, end)]
     return np.cumsum(begun, dtype=np.int64) - 1
 
 
@@ -97,7 +97,7 @@ def _relations(bonds: Sequence[Bond], index: Ints, laid: Floats) -> Relations:
 
 
 def _stretches(runs: Sequence[Run], index: Ints) -> Stretches:
-    pieces = [(run, fact) for run in runs for fact in run.stretches if max(fact.members) < len(run.keys)]
+    pieces = [(run, fact) for run in runs for fact in run.stretches if run.adds(fact)]
     return Stretches(
         np.array([index[run.keys[fact.anchor]] for run, fact in pieces], np.int64),
         np.cumsum([0, *(len(fact.members) for _, fact in pieces)]),

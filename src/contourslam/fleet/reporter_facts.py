@@ -66,21 +66,24 @@ class News:
             Base in the robot's own map after the last scan.
         """
         memory = self.memory
-        if len(self.poses) < len(memory.keyframes):
-            until = min(len(self.poses) + AT_ONCE, len(memory.keyframes))
-            facts: list[Fact] = [self._keyframe(number, pose) for number in range(len(self.poses), until)]
-            if until < len(memory.keyframes):
-                return facts
-        else:
-            facts = []
+        until = min(len(self.poses) + AT_ONCE, len(memory.keyframes))
+        facts: list[Fact] = [self._keyframe(number, pose) for number in range(len(self.poses), until)]
         graph, places = memory.graph, memory.places.list
-        first, self._factors = self._factors, min(self._factors + RELATIONS_AT_ONCE, graph.factors.size())
+        first, self._factors = self._factors, self._within(graph.factors, self._factors)
         facts += [_relation(graph.factors.at(i), tie=False) for i in range(first, self._factors)]
-        first, self._ties = self._ties, min(self._ties + RELATIONS_AT_ONCE, graph.ties.size())
+        first, self._ties = self._ties, self._within(graph.ties, self._ties)
         facts += [_relation(graph.ties.at(i), tie=True) for i in range(first, self._ties)]
-        first, self._stretches = self._stretches, min(self._stretches + RELATIONS_AT_ONCE, len(places))
-        facts += [StretchFact(p.anchor, p.members, p.seen) for p in places[first : self._stretches]]
+        for place in places[self._stretches : self._stretches + RELATIONS_AT_ONCE]:
+            if max(place.anchor, *place.members) >= until:
+                break
+            facts.append(StretchFact(place.anchor, place.members, place.seen))
+            self._stretches += 1
         return facts
+
+    def _within(self, factors: Any, first: int) -> int:
+        """Up to which factor to tell now: of an old map, each keyframe comes with the factors that end at it."""
+        until = min(first + RELATIONS_AT_ONCE, factors.size())
+        return next((i for i in range(first, until) if max(factors.at(i).keys()) >= len(self.poses)), until)
 
     def _keyframe(self, number: int, pose: Floats) -> KeyframeFact:
         memory, keyframe = self.memory, self.memory.keyframes[number]

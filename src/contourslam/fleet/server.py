@@ -9,13 +9,14 @@ from time import perf_counter
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Floats
+from contourslam.contour.contours import Floats, Ints
 from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
-from contourslam.fleet.facts import Answer, Report
+from contourslam.fleet.facts import Answer, KeyframeFact, Report
 from contourslam.fleet.inbox import Inbox, Source
-from contourslam.fleet.runs import Run
+from contourslam.fleet.runs import Identity, Run
 from contourslam.fleet.server_search import Search
+from contourslam.fleet.wire import decode
 from contourslam.joining.joint import Joint
 from contourslam.maps.saved_map import SavedMap
 
@@ -52,10 +53,13 @@ class Shared:
     members : tuple of (str, int)
         Robot and run, in the order of the map's keyframes.
     counts : tuple of int
-        Keyframes of each of them.
+        Keyframes that each of them added.
     saved : SavedMap
     joined : tuple of Joined
         How it came about, and on which evidence.
+    rows : tuple of ndarray of int
+        Of each of them, where all its keyframes are in the map: one that began in a map that was kept shares those with
+        the run before.
     """
 
     number: int
@@ -63,13 +67,13 @@ class Shared:
     counts: tuple[int, ...]
     saved: SavedMap
     joined: tuple[Joined, ...]
+    rows: tuple[Ints, ...]
 
     def frames(self) -> Iterator[tuple[Source, Floats]]:
         """Give the runs and the poses of their keyframes, each of shape (k, 3)."""
         if self.saved.keyframes is not None:
-            ends = np.cumsum([0, *self.counts]).tolist()
-            for source, begin, end in zip(self.members, ends, ends[1:], strict=False):
-                yield source, self.saved.keyframes.poses[begin:end]
+            for source, rows in zip(self.members, self.rows, strict=True):
+                yield source, self.saved.keyframes.poses[rows]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +89,7 @@ class _Placed:
 
 NOWHERE = _Placed(-1, (), -1, np.zeros(3), np.zeros((3, 3)))
 MOST_FAULTS = 1000
+MOST_SILENT = 1000  # runs that say that they are there, and of which no report has come
 
 
 class FleetServer:
@@ -127,6 +132,7 @@ class FleetServer:
         self._clock = clock
         self._lock = threading.Lock()  # held for moments; what follows is changed under it
         self._fresh: deque[Report] = deque(self._inbox.kept())
+        self._told, self._silent = set(self._inbox.sources), set[Source]()  # runs of which reports have come, and not
         self._faults: dict[Fault, None] = {Fault("", 0, trouble): None for trouble in self._inbox.troubles}
         self._placed: dict[Source, _Placed] = {}
         # All that follows is touched by the thread that ticks alone.
@@ -136,6 +142,8 @@ class FleetServer:
         self._numbers = 0
         self._since: dict[int, float] = {}  # common maps in which keyframes wait, and since when
         self._solved: dict[int, int] = {}  # keyframes of each when it was solved as a whole
+        self._known: dict[Identity, Run] = {}  # who told of each keyframe first
+        self._aside: set[Source] = set()
         self.search = Search()
 
     def push(self, data: bytes) -> Source:
@@ -159,11 +167,31 @@ class FleetServer:
             If it cannot be kept; it is not taken then, and the robot will send it again.
         """
         with self._lock:
+            stranger = self._stranger(data)
+            if stranger is not None:
+                return stranger
             taken = self._inbox.take(data)
+            if taken.reports:
+                self._told.add(taken.source)
+                self._silent.discard(taken.source)
             self._fresh.extend(taken.reports)
             if taken.fault:
                 self._note(Fault(*taken.source, taken.fault))
         return taken.source
+
+    def _stranger(self, data: bytes) -> Source | None:
+        """Give the source of a status that is one too many of runs that have told nothing yet."""
+        if data[3:4] != b"S":
+            return None
+        message = decode(data)
+        source = message.robot, message.run
+        if source in self._silent or source in self._told:
+            return None
+        if len(self._silent) < MOST_SILENT:
+            self._silent.add(source)
+            return None
+        self._note(Fault(*source, f"more than {MOST_SILENT} runs have told nothing; this one is not heard"))
+        return source
 
     def _note(self, fault: Fault) -> None:
         self._faults.pop(fault, None)
@@ -188,7 +216,7 @@ class FleetServer:
             if common.due or now >= self._since.get(common.number, now) + LATEST:
                 self._advance(common)
         while len(self.search) and (until is None or self._clock() < until):
-            found = self.search.step(self._where)
+            found = self._look()
             if found is not None:
                 self._join(*found, now)
         if not len(self.search) and (until is None or self._clock() < until):
@@ -215,6 +243,8 @@ class FleetServer:
                 if not self._fresh:
                     return
                 report = self._fresh.popleft()
+            if (report.robot, report.run) in self._aside:
+                continue
             run = self._runs.setdefault((report.robot, report.run), Run(report.robot, report.run))
             if run not in self._where:
                 self._numbers += 1
@@ -222,23 +252,62 @@ class FleetServer:
             for fact in report.facts:
                 wrong = run.take(fact)
                 if wrong:
-                    with self._lock:
-                        self._note(Fault(run.robot, run.number, f"report {report.number}: {wrong}; it is left out"))
+                    self._tell(run, f"report {report.number}: {wrong}; it is left out")
+                elif isinstance(fact, KeyframeFact):
+                    self._recognise(run)
             self._since.setdefault(self._where[run].number, now)
+
+    def _tell(self, run: Run, text: str) -> None:
+        with self._lock:
+            self._note(Fault(run.robot, run.number, text))
+
+    def _recognise(self, run: Run) -> None:
+        """Let a run that began in a map that was kept share the common map of the run that the map is from."""
+        identity, own = run.identities[-1], self._where[run]
+        if identity is None:
+            return
+        other = self._where.get(self._known.setdefault(identity, run), own)
+        if other is not own and not run.keys and len(own.runs) == 1:
+            self._where[run] = other
+            other.runs.append(run)
+            own.runs = []
+            del self._commons[own.number]
+            self._since.pop(own.number, None)
 
     def _advance(self, common: CommonMap) -> None:
         self._since.pop(common.number, None)
         if common.waiting:
-            common.advance()
+            try:
+                common.advance()
+            except Exception as error:  # whatever is wrong with one map, the others go on
+                self._put_aside(common, error)
+                return
             others = (other for other in self._commons.values() if other is not common and len(other))
             self.search.hear(common, (other for other in others if self._site(other) == self._site(common)))
+
+    def _put_aside(self, common: CommonMap, error: Exception) -> None:
+        """Give up a common map that cannot be solved; what its runs tell is kept, and not used any more."""
+        text = " ".join(str(error).split())[:200]
+        for run in common.runs:
+            self._tell(run, f"common map {common.number} cannot be solved ({text}); its runs are put aside")
+            self._aside.add((run.robot, run.number))
+            del self._where[run]
+        common.runs = []
+        self._commons.pop(common.number, None)
+        self._since.pop(common.number, None)
+        self.search.forget(common)
 
     def _site(self, common: CommonMap) -> str | None:
         return self._sites.get(common.runs[0].robot)
 
     def _join(self, older: CommonMap, younger: CommonMap, joint: Joint, now: float) -> None:
         event = Joined(now, older.number, younger.number, older.members, younger.members, joint)
-        older.absorb(younger, joint)
+        try:
+            older.absorb(younger, joint)
+        except Exception as error:
+            self._put_aside(older, error)
+            self._put_aside(younger, error)
+            return
         older.joined += (event,)
         del self._commons[younger.number]
         for run in younger.runs:
@@ -247,6 +316,15 @@ class FleetServer:
             self._since.setdefault(older.number, self._since.pop(younger.number))
         younger.runs = []
         self.search.merged(older, younger)
+
+    def _look(self) -> tuple[CommonMap, CommonMap, Joint] | None:
+        try:
+            return self.search.step(self._where)
+        except Exception as error:
+            text = " ".join(str(error).split())[:200]
+            with self._lock:
+                self._note(Fault("", 0, f"a view cannot be looked for ({text}); it is left out"))
+            return None
 
     def _solve_one(self) -> None:
         """Solve one common map as a whole, if one has grown by so much."""
@@ -267,29 +345,41 @@ class FleetServer:
         Shared
         """
         common = self._commons[number]
-        saved, order = common.kept()
-        saved = refined(saved, self._config)
-        common.begin_anew(saved, order)
         self._solved[number] = len(common)
+        saved, order = common.kept()
+        try:
+            better = refined(saved, self._config)
+        except Exception as error:
+            text = " ".join(str(error).split())[:200]
+            self._tell(common.runs[0], f"common map {number} cannot be solved as a whole ({text}); it stays as it is")
+            return _shared(common, saved)
+        common.begin_anew(better, order)
         self.search.moved(common)
-        return _shared(common, saved)
+        return _shared(common, better)
 
     def _place(self) -> None:
         """Let the answers know where each run is now."""
-        placed = {}
-        for common in self._commons.values():
-            members = common.members
-            for run in common.runs:
-                last = len(run.keys) - 1
-                if last < 0:
-                    continue
-                before = self._placed.get((run.robot, run.number), NOWHERE)
-                pose = common.pose(run, last)
-                same = before.keyframe == last and before.common == common.number
-                covariance = before.covariance if same else common.covariance(run, last)
-                placed[run.robot, run.number] = _Placed(common.number, members, last, pose, covariance)
+        placed: dict[Source, _Placed] = {}
+        for common in list(self._commons.values()):
+            try:
+                placed.update(self._places_of(common))
+            except Exception as error:
+                self._put_aside(common, error)
         with self._lock:
             self._placed = placed
+
+    def _places_of(self, common: CommonMap) -> dict[Source, _Placed]:
+        placed, members = {}, common.members
+        for run in common.runs:
+            last = len(run.keys) - 1
+            if last < 0:
+                continue
+            before = self._placed.get((run.robot, run.number), NOWHERE)
+            pose = common.pose(run, last)
+            same = before.keyframe == last and before.common == common.number
+            covariance = before.covariance if same else common.covariance(run, last)
+            placed[run.robot, run.number] = _Placed(common.number, members, last, pose, covariance)
+        return placed
 
     def answers(self) -> tuple[Answer, ...]:
         """Give an answer for each run that was ever heard of, from any thread.
@@ -299,8 +389,8 @@ class FleetServer:
         JournalError
             If what was received cannot be kept; nothing is acknowledged then.
         """
+        self._inbox.settle()  # the disk may take its time; messages go on coming in
         with self._lock:
-            self._inbox.settle()
             return tuple(self._answer(source) for source in self._inbox.sources)
 
     def _answer(self, source: Source) -> Answer:
@@ -331,4 +421,7 @@ class FleetServer:
 def _shared(common: CommonMap, saved: SavedMap) -> Shared:
     runs = [run for run in common.runs if run.keys]
     members = tuple((run.robot, run.number) for run in runs)
-    return Shared(common.number, members, tuple(len(run.keys) for run in runs), saved, common.joined)
+    index = np.empty(len(common), np.int64)
+    index[[run.keys[number] for run in runs for number in run.own]] = np.arange(len(common))
+    rows = tuple(index[run.keys] for run in runs)
+    return Shared(common.number, members, tuple(len(run.own) for run in runs), saved, common.joined, rows)

@@ -16,9 +16,11 @@ from contourslam.joining.find import LIKELY, decide
 from contourslam.joining.joint import Apart, Joint
 from contourslam.joining.looks import Look, Method, look, turned_round
 
-LATER = 10  # a chart is drawn anew when one keyframe has come for so many that are in it
+LATER = 10  # a chart is drawn anew when one keyframe has come for so many that are in it,
+LAG = 16  # or so many: about the way of one view, that no two robots meet in what neither chart holds
 SURE = 5.0  # log-odds of a look after which two common maps are judged at once;
 SELDOM = 2  # else when they have so many views that may be alike, and one more for so many that they were judged by
+MOST_SIGHTS = 200  # kept of two common maps that stay apart; of more, the older half is given up
 MOST_WAITING = 20_000  # views that wait to be looked for; of more the oldest are given up
 
 
@@ -55,32 +57,28 @@ class Drawn:
     Attributes
     ----------
     chart : Chart
-    first : dict of Run to int
-        The run of each drive, in their order, and its first keyframe in the chart.
+    owners : list of (Run, int)
+        Run of each keyframe of the chart, and its number there.
+    index : dict of (Run, int) to int
+        The other way round.
+    runs : frozenset of Run
     views : dict of (Run, (int, int)) to int
         Number in the chart of each view of each run.
     """
 
     chart: Chart
-    first: dict[Run, int]
+    owners: list[tuple[Run, int]]
+    index: dict[tuple[Run, int], int]
+    runs: frozenset[Run]
     views: dict[tuple[Run, View], int]
 
     def holds(self, sight: Sight) -> bool:
         """Whether the keyframes and the view of a sight are in it, as far as they are of its runs."""
-        for run, number in ((sight.run, sight.keyframe), (sight.near, sight.anchor)):
-            first = self.first.get(run)
-            if first is not None and self.whose(min(first + number, len(self.chart.frames) - 1)) != (run, number):
-                return False
-        return sight.run not in self.first or (sight.run, sight.view) in self.views
-
-    def of(self, run: Run, number: int) -> int:
-        """Keyframe in the chart."""
-        return self.first[run] + number
-
-    def whose(self, keyframe: int) -> tuple[Run, int]:
-        """Run of a keyframe of the chart, and its number there."""
-        run, first = next(each for each in reversed(self.first.items()) if each[1] <= keyframe)
-        return run, keyframe - first
+        if sight.near in self.runs and (sight.near, sight.anchor) not in self.index:
+            return False
+        if sight.run not in self.runs:
+            return True
+        return (sight.run, sight.keyframe) in self.index and (sight.run, sight.view) in self.views
 
 
 class Search:
@@ -96,7 +94,7 @@ class Search:
 
     def __init__(self) -> None:
         self.looks = self.given_up = 0
-        self._viewed: dict[Run, int] = {}
+        self._viewed: dict[Run, tuple[int, int]] = {}  # piece of each run, and number in it, of the next view
         self._waiting: deque[tuple[Run, View, Ints, CommonMap]] = deque()
         self._sights: dict[frozenset[int], list[Sight]] = {}
         self._piece: tuple[Run, View, Chart] | None = None  # the view that was looked for last
@@ -110,10 +108,9 @@ class Search:
         """Note the views that the runs of a common map have finished, to be looked for in the other ones."""
         others = list(others)
         for run in common.runs:
-            views = list(run.views(WAY))
-            for view, members in views[self._viewed.get(run, 0) :]:
+            for at, view, members in run.views(WAY, self._viewed.get(run, (0, 0))):
                 self._waiting.extend((run, view, members, other) for other in others)
-            self._viewed[run] = max(len(views), self._viewed.get(run, 0))
+                self._viewed[run] = at[0], at[1] + 1
         while len(self._waiting) > MOST_WAITING:
             self._waiting.popleft()
             self.given_up += 1
@@ -132,8 +129,8 @@ class Search:
             Two that overlap, the older first, with the joint in the numbers of their keyframes.
         """
         run, view, members, other = self._waiting.pop()
-        own = where[run]
-        if not other.runs or own is other:  # has become part of another one, or of this
+        own = where.get(run)
+        if own is None or not other.runs or own is other:  # put aside, or part of another one by now, or of this
             return None
         target = self._draw(other)
         if self._piece is None or self._piece[:2] != (run, view):
@@ -147,14 +144,14 @@ class Search:
         for each in found:
             frames = target.chart.frames
             nearest = int(np.argmin(np.hypot(*(frames.poses[:, :2] - each.pose[:2]).T)))
-            near, anchor = target.whose(nearest)
+            near, anchor = target.owners[nearest]
             pose = between_one(frames.poses[nearest], each.pose)
             kept.append(Sight(run, view, int(members[each.keyframe]), near, anchor, pose, each.odds, each.method))
         views = len({(each.run, each.view) for each in kept})
         if views < self._again.get(pair, 0) and max(each.odds for each in found) < SURE:
             return None
         # Those found apart are judged ever more seldom: the answer gets dearer as they grow.
-        self._again[pair] = views + 1 + views // SELDOM
+        self._again[pair] = min(views + 1 + views // SELDOM, MOST_SIGHTS // 2)
         return self._decide(own, other, kept)
 
     def _decide(
@@ -163,7 +160,9 @@ class Search:
         older, younger = sorted((own, other), key=lambda common: common.number)
         first, second = self._draw(older, sights), self._draw(younger, sights)
         joint = decide(first.chart, second.chart, list(_laid(sights, first, second)))
-        if isinstance(joint, Apart):
+        if isinstance(joint, Apart) or not joint.ties:
+            if len(sights) > MOST_SIGHTS:
+                del sights[: len(sights) // 2]
             return None
         ties = tuple(replace(tie, first=_key(first, tie.first), second=_key(second, tie.second)) for tie in joint.ties)
         return older, younger, replace(joint, ties=ties)
@@ -179,6 +178,13 @@ class Search:
             if len(into) == 2:
                 self._sights.setdefault(into, []).extend(sights)
 
+    def forget(self, common: CommonMap) -> None:
+        """Take notice that a common map is no more."""
+        self._drawn.pop(common.number, None)
+        for pair in [pair for pair in self._sights if common.number in pair]:
+            self._again.pop(pair, None)
+            del self._sights[pair]
+
     def moved(self, common: CommonMap) -> None:
         """Take notice that a common map was solved anew."""
         self._drawn.pop(common.number, None)
@@ -189,29 +195,30 @@ class Search:
         if drawn is not None:
             count = len(drawn.chart.frames)
             new = len(common) - count
-            if new * LATER < count and all(drawn.holds(sight) for sight in sights):
+            if new < min(count / LATER, LAG) and all(drawn.holds(sight) for sight in sights):
                 return drawn
         drawn = self._drawn[common.number] = _draw(common)
         return drawn
 
 
 def _draw(common: CommonMap) -> Drawn:
-    saved, _ = common.kept()
+    saved, order = common.kept()
     chart = Chart(saved)
-    begins = np.cumsum([0, *(len(run.keys) for run in common.runs)]).tolist()
-    drawn = Drawn(chart, dict(zip(common.runs, begins, strict=False)), {})
-    counts: dict[int, int] = {}
+    owners = [common.owners[key] for key in order]
+    index = {owner: number for number, owner in enumerate(owners)}
+    drawn = Drawn(chart, owners, index, frozenset(common.runs), {})
+    drives = [(run, begin) for run in common.runs for begin, _ in run.pieces]
+    counts = [0] * len(drives)
     for number, members in enumerate(chart.stretches):
-        run, first = drawn.whose(int(members[0]))
         drive = int(chart.frames.drives[members[0]])
-        own = sum(begin <= first for begin in run.begins) - 1
-        drawn.views[run, (own, counts.get(drive, 0))] = number
-        counts[drive] = counts.get(drive, 0) + 1
+        run, begin = drives[drive]
+        drawn.views[run, (begin, counts[drive])] = number
+        counts[drive] += 1
     return drawn
 
 
 def _key(drawn: Drawn, keyframe: int) -> int:
-    run, number = drawn.whose(keyframe)
+    run, number = drawn.owners[keyframe]
     return run.keys[number]
 
 
@@ -219,18 +226,18 @@ def _piece(run: Run, members: Ints) -> Chart:
     """Give one view of a run as a chart of its own."""
     part = Run(run.robot, run.number)
     part.keyframes, part.begins = run.keyframes[members[0] : members[-1] + 1], [0]
-    part.keys = list(range(len(members)))
+    part.keys, part.pieces = list(range(len(members))), [[0, len(members)]]
     return Chart(assemble([part], run.chained(members), part.keys, []))
 
 
 def _laid(sights: Iterable[Sight], first: Drawn, second: Drawn) -> Iterator[Look]:
     """Give what was seen as looks of the second chart in the first, as the charts are now."""
     for sight in sights:
-        back = sight.run in first.first
+        back = sight.run in first.runs
         inside, of = (second, first) if back else (first, second)
         if not (of.holds(sight) and inside.holds(sight)):
             continue  # a view that has come out a little shorter in the chart
-        pose = compose_one(inside.chart.frames.poses[inside.of(sight.near, sight.anchor)], sight.pose)
+        pose = compose_one(inside.chart.frames.poses[inside.index[sight.near, sight.anchor]], sight.pose)
         number = of.views[sight.run, sight.view]
-        found = Look(number, of.of(sight.run, sight.keyframe), pose, sight.odds, sight.method)
+        found = Look(number, of.index[sight.run, sight.keyframe], pose, sight.odds, sight.method)
         yield turned_round(found, second.chart, first.chart) if back else found

@@ -104,11 +104,11 @@ class PoseGraph:
     def update(self, more: int = 0) -> None:
         """Let iSAM2 take in what is new; `more` further steps where much has moved."""
         self.updates += 1
-        self._isam.update(self._new, self._values)
+        new, values = self._new, self._values
+        self._new, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        self._isam.update(new, values)
         for _ in range(more):
             self._isam.update()
-        self._new = gtsam.NonlinearFactorGraph()
-        self._values = gtsam.Values()
 
     @property
     def settled(self) -> bool:
