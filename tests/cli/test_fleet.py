@@ -1,6 +1,7 @@
 """``contourslam fleet``."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from contourslam.cli.entry import main
 from contourslam.maps import load_map
 from contourslam.recordings import read_trajectory
+from contourslam.report import fleet_folder
 
 
 @pytest.fixture(scope="module")
@@ -19,12 +21,29 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [str(folder / "robot1"), str(folder / "robot2")]
 
 
+def leave_another_fleet(folder: Path) -> set[str]:
+    """What stands in a folder: some of it of a fleet that was written there before."""
+    folder.mkdir()
+    (folder / "metrics.json").write_text(json.dumps({"robots": [{"name": "robot9"}, {"name": "../robot8"}]}))
+    (folder.parent / "robot8.tum").touch()
+    names = {"common9.cmap", "common9.svg", "common_room.svg", "robot9.tum", "robot9_online.tum", "mine.tum"}
+    for name in names:
+        (folder / name).touch()
+    return names
+
+
 def test_a_fleet_leaves_the_common_map_each_way_in_it_and_why_it_was_joined(
     robots: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bad_air = ["--loss", "0.1", "--delay", "1", "--repeat", "0.1", "--restart-server", "20"]
-    assert main(["fleet", *robots, "-o", str(tmp_path / "out"), "--json", *bad_air]) == 0
-    told = json.loads(capsys.readouterr().out)
+    before = leave_another_fleet(tmp_path / "out")
+    bad_air = ["--loss", "0.1", "--delay", "1", "--repeat", "0.1", "--restart-server", "20", "--restart-robot", "500"]
+    assert main(["fleet", *robots, "-o", str(tmp_path / "out"), "--overwrite", "--json", *bad_air]) == 0
+    said = capsys.readouterr()
+    assert "--restart-robot 500: the first robot's recording had ended by then" in said.err
+    told = json.loads(said.out)
+    assert (told["server_restarts"], told["robots"][0]["restarts"]) == (1, 0)
+    assert before & {path.name for path in (tmp_path / "out").iterdir()} == {"common_room.svg", "mine.tum"}
+    assert (tmp_path / "robot8.tum").exists()
     assert json.loads((tmp_path / "out" / "metrics.json").read_text()) == told
     (event,) = told["joined"]
     assert event["agreeing"] > 10.0
@@ -41,6 +60,21 @@ def test_a_fleet_leaves_the_common_map_each_way_in_it_and_why_it_was_joined(
     assert all(name in page for name in ("robot1", "robot2", "Joints and their evidence"))
 
 
-def test_a_fleet_of_one_is_refused(robots: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fleet", robots[0], "-o", str(tmp_path)]) == 1
-    assert "two recordings" in capsys.readouterr().err
+def test_what_cannot_be_meant_is_refused_before_anything_is_played(
+    robots: list[str], tmp_path: Path, failure: Callable[..., str]
+) -> None:
+    assert "two recordings" in failure("fleet", robots[0], "-o", str(tmp_path))
+    for option in ("--restart-robot", "--restart-server"):
+        for after in ("0", "-3", "nan", "inf"):
+            said = failure("fleet", *robots, "-o", str(tmp_path / "out"), option, after)
+            assert f"{option} {after}: a program begins anew" in said
+    assert "choose another folder" in failure("fleet", *robots, "-o", robots[1], "--overwrite")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_page_shows_the_faults_that_there_were_and_no_word_where_there_were_none() -> None:
+    fault = {"robot": "robot1", "run": 255, "text": "keyframe 7 comes after <keyframe> 5"}
+    section = fleet_folder._faults([fault])
+    assert section is not None
+    assert all(word in str(section) for word in ("robot1", "ff", "comes after &lt;keyframe&gt; 5"))
+    assert fleet_folder._faults([]) is None

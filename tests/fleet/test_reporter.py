@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,9 +16,11 @@ from contourslam.scan import LaserScan, Odometry, TruePose
 pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
-from contourslam.fleet.facts import Answer, Fact, KeyframeFact, RelationFact, Report, StretchFact
+from contourslam.fleet import reporter as module
+from contourslam.fleet.facts import Answer, Fact, KeyframeFact, RelationFact, Report, Status, StretchFact
 from contourslam.fleet.measure import measure
 from contourslam.fleet.reporter import Reporter
+from contourslam.fleet.reporter_facts import News
 from contourslam.fleet.reporter_outbox import OVERHEAD, PATIENCE, WINDOW, Allowance, Outbox
 from contourslam.fleet.wire import decode, encode
 from contourslam.graph import GraphSlam, kept, resume
@@ -201,6 +204,65 @@ def test_the_robot_is_placed_by_the_keyframe_that_the_server_places() -> None:
     assert np.linalg.eigvalsh(placed.covariance).min() > 0.0
     assert placed.covariance[0, 0] > 0.02**2
     assert math.sqrt(placed.covariance[:2, :2].trace()) < 1.0
+
+
+def begun_again(times: int) -> tuple[Reporter, int]:
+    """A robot whose mapping begins again and again while there is no server."""
+    reporter, runs = Reporter("robot1"), set()
+    for _ in range(times):
+        feed(GraphSlam(CONFIG, lidar_mount=MOUNT), reporter, messages()[:60])
+        runs.add(reporter.run)
+    reporter.flush(1e6)
+    return reporter, len(runs)
+
+
+def test_all_runs_that_were_made_without_a_server_arrive_once_there_is_one() -> None:
+    reporter, runs = begun_again(8)
+    assert len(told(reporter)) == runs == 8
+    assert reporter.given_up == 0
+
+
+def test_runs_that_are_given_up_for_their_size_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, _ = begun_again(5)
+    monkeypatch.setattr(module, "FORMER", 0)
+    reporter, _ = begun_again(5)
+    assert reporter.given_up == whole.waiting - reporter.waiting > 0
+    assert len(told(reporter)) == 1
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 1e9])
+def test_a_keyframe_that_cannot_be_sent_is_told_without_its_contours_and_the_fleet_goes_on(
+    wrong: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = News.collect
+
+    def spoilt(news: News, pose: Floats) -> list[Fact]:
+        facts = whole(news, pose)
+        for i, fact in enumerate(facts):
+            if isinstance(fact, KeyframeFact) and fact.number == 2:
+                facts[i] = replace(fact, seen=np.full((1, 13), wrong, np.float32))
+            elif isinstance(fact, RelationFact) and fact.second == 4:
+                facts[i] = replace(fact, pose=np.full(3, 1e3 * wrong))
+        return facts
+
+    monkeypatch.setattr(News, "collect", spoilt)
+    slam, reporter = GraphSlam(CONFIG, lidar_mount=MOUNT), Reporter("robot1")
+    feed(slam, reporter, messages()[:400])
+    reporter.flush(1e6)
+    (facts,) = told(reporter).values()
+    keyframes = [fact for fact in facts if isinstance(fact, KeyframeFact)]
+    assert [fact.number for fact in keyframes] == list(range(len(slam.memory.keyframes)))
+    assert [fact.number for fact in keyframes if not len(fact.points)] == [2]
+    relations = sum(isinstance(fact, RelationFact) for fact in facts)
+    missing = slam.memory.graph.factors.size() + slam.memory.graph.ties.size() - relations
+    assert missing > 0
+    assert reporter.left_out == missing + 1
+
+
+def test_a_status_that_cannot_be_sent_stops_nothing() -> None:
+    box = Outbox(1)
+    box.status = Status("a", 1, 0, 0, np.full(3, np.nan), 0.0)
+    assert box.news() is None
 
 
 def test_an_answer_to_somebody_else_changes_nothing() -> None:

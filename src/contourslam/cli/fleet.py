@@ -1,5 +1,6 @@
 """``contourslam fleet``: several robots' recordings played side by side to one server."""
 
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from contourslam.cli.console import complain, note, prepare_folder, print_json, progress
+from contourslam.cli.console import complain, keep_apart, note, prepare_folder, print_json, progress
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt, UntilStopped
 from contourslam.cli.options import Json, Output, Overwrite, Settings
 from contourslam.cli.run import DEFAULTS
-from contourslam.config import Config
 from contourslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class Fleet:
     Each recording begins at the same time, whatever its stamps. Each robot tells the server what it learned, in the
     bytes that it would send over the air, and is told where it is in the common map once the server has found that its
     map and another one overlap. --loss, --delay and --repeat make the air bad; --restart-robot and --restart-server let
-    a program die and begin anew.
+    a program die and begin anew: the robot's without its map and what it had not sent, the server's with what it kept.
 
     The folder gets index.html (a page about the fleet), metrics.json, each common map (common1.cmap) with a picture,
     and of each robot its trajectory in the common map, as it is known at the end and as it was known at the time.
@@ -63,7 +63,7 @@ class Fleet:
 
         if len(self.recordings) < 2:
             raise ConfigError("a fleet is two robots or more: name two recordings or more")
-        _check(self.settings)
+        self._check()
         air = Air(self.loss, self.delay, self.repeat)
         recordings = [open_recording(path) for path in self.recordings]
         prepare_folder(self.output, overwrite=self.overwrite)
@@ -80,6 +80,10 @@ class Fleet:
             )
         if interrupt.requested and not any(robot.told for robot in fleet.robots):
             raise KeyboardInterrupt
+        if self.restart_robot is not None and not fleet.robots[0].restarts:
+            note(f"--restart-robot {self.restart_robot:g}: the first robot's recording had ended by then")
+        if self.restart_server is not None and not fleet.restarts:
+            note(f"--restart-server {self.restart_server:g}: the fleet had ended by then")
         metrics = write_fleet_folder(self.output, fleet, command=command)
         if self.json:
             print_json(metrics)
@@ -95,6 +99,17 @@ class Fleet:
             return INTERRUPTED
         return 0
 
+    def _check(self) -> None:
+        """Refuse what cannot be meant."""
+        if self.settings.back_end != "graph":
+            raise ConfigError(
+                "robots of a fleet map with the graph: leave --back-end away, and install contourslam[graph]"
+            )
+        for option, after in (("--restart-robot", self.restart_robot), ("--restart-server", self.restart_server)):
+            if after is not None and not 0.0 < after < math.inf:
+                raise ConfigError(f"{option} {after:g}: a program begins anew some seconds after the begin, above 0")
+        keep_apart(self.output, self.recordings)
+
     def _players(self, recordings: "list[Recording]", sources: "list[UntilStopped[Message]]") -> "list[Player]":
         import numpy as np
 
@@ -108,11 +123,6 @@ class Fleet:
             shown = messages if number else progress(messages, "message of the first robot")
             players.append(Player(name, shown, mount, restarts))
         return players
-
-
-def _check(settings: Config) -> None:
-    if settings.back_end != "graph":
-        raise ConfigError("robots of a fleet map with the graph: leave --back-end away, and install contourslam[graph]")
 
 
 def _names(paths: tuple[Path, ...]) -> list[str]:

@@ -4,11 +4,12 @@ import math
 import secrets
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from contourslam.contour.contours import Floats
+from contourslam.errors import MessageError
 from contourslam.fleet.facts import Answer, Fact, KeyframeFact, Report, Status
 from contourslam.fleet.reporter_facts import News
 from contourslam.fleet.reporter_outbox import Allowance, Outbox
@@ -20,7 +21,7 @@ from contourslam.matching.small import moved, turned
 from contourslam.slam.result import ScanUpdate
 
 FULL = 4  # keyframes after which a report is closed before its time
-FORMER = 4  # runs before this one of which the server may still miss something
+FORMER = 16 << 20  # bytes of runs before this one that are kept for a server that misses them: some hours of driving
 
 
 def draw_run() -> int:
@@ -64,6 +65,10 @@ class Reporter:
 
     :meth:`push` is for the thread that maps; all others may be called from any thread at any time.
 
+    All reports of the run are kept until it ends, those that the server has acknowledged too: a server that lost its
+    folder is told all of it again. That takes 1 to 6 MB an hour. Of runs before it only those are kept of which the
+    server still misses something, up to 16 MiB together; beyond, the oldest are given up, and counted.
+
     Parameters
     ----------
     robot : str
@@ -78,6 +83,11 @@ class Reporter:
     Attributes
     ----------
     robot : str
+    given_up : int
+        Reports of earlier runs that the server never got, and never will.
+    left_out : int
+        Facts that could not be sent as they are, as for a number that is not finite: a keyframe was told without its
+        contours then, anything else not at all.
 
     Raises
     ------
@@ -89,6 +99,7 @@ class Reporter:
         self, robot: str, run: Callable[[], int] = draw_run, *, period: float = 1.0, rate: float = 4000.0
     ) -> None:
         self.robot = check_name(robot)
+        self.given_up = self.left_out = 0
         self._draw, self._period = run, period
         self._news: News | None = None
         self._facts: list[Fact] = []
@@ -116,7 +127,7 @@ class Reporter:
 
     @property
     def settled(self) -> bool:
-        """Whether the server has said that it has everything that there is to tell."""
+        """Whether the server has said that it has everything that there is to tell, but for what was given up."""
         with self._lock:
             return not self._facts and all(box.settled for box in self._boxes())
 
@@ -158,7 +169,7 @@ class Reporter:
         with self._lock:
             self._allowance.renew(now)
             out: list[bytes] = []
-            self._former = [box for box in self._former if not box.settled][-FORMER:]
+            self._former = [box for box in self._former if not box.settled]
             boxes = self._boxes()
             for box in boxes:
                 out += box.due(now, self._allowance)
@@ -199,17 +210,41 @@ class Reporter:
             if self._outbox is None or not news.continued:
                 if self._outbox is not None:
                     self._former.append(self._outbox)
+                    self._make_room()
                 self._outbox = Outbox(self._draw())
                 self._answer = self._placed = None
         return news
 
+    def _make_room(self) -> None:
+        """Give up the oldest of the earlier runs where they take too much."""
+        self._former = [box for box in self._former if not box.settled]
+        while self._former and sum(box.size for box in self._former) > FORMER:
+            box = self._former.pop(0)
+            self.given_up += len(box.reports) - box.received
+
     def _close(self, now: float) -> None:
         """Make a report of the facts that wait."""
+        facts, self._facts, self._closed_at = tuple(self._facts), [], now
+        self._tell(facts)
+
+    def _tell(self, facts: tuple[Fact, ...]) -> None:
+        """Make a report; where some facts cannot be sent, the others still are, each by itself."""
         outbox = self._outbox
         if outbox is None:
             return
-        facts, self._facts, self._closed_at = tuple(self._facts), [], now
-        report = encode(Report(self.robot, outbox.run, len(outbox.reports), facts))
+        try:
+            report = encode(Report(self.robot, outbox.run, len(outbox.reports), facts))
+        except MessageError:
+            if len(facts) > 1:
+                for fact in facts:
+                    self._tell((fact,))
+                return
+            self.left_out += 1
+            fact = facts[0]
+            if isinstance(fact, KeyframeFact) and len(fact.points) + len(fact.seen):
+                # Those after it count on its number.
+                self._tell((replace(fact, points=fact.points[:0], seen=fact.seen[:0]),))
+            return
         with self._lock:
             outbox.add(report)
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from contourslam.errors import MessageError
 from contourslam.fleet.facts import Answer, Status
 from contourslam.fleet.wire import encode
 
@@ -49,7 +50,9 @@ class Outbox:
     ----------
     run : int
     reports : list of bytes
-        All, by their numbers.
+        All, by their numbers; those that were acknowledged too, for a server that loses them.
+    size : int
+        Bytes of them.
     received : int
         As many the server has, as far as it said.
     status : Status or None
@@ -59,7 +62,7 @@ class Outbox:
     def __init__(self, run: int) -> None:
         self.run = run
         self.reports: list[bytes] = []
-        self.received = 0
+        self.size = self.received = 0
         self.status: Status | None = None
         self._sent: list[float] = []  # when each was sent last
         self._missing: tuple[int, ...] = ()
@@ -72,6 +75,7 @@ class Outbox:
     def add(self, report: bytes) -> None:
         """Take in the next report."""
         self.reports.append(report)
+        self.size += len(report)
         self._sent.append(-math.inf)
 
     def answered(self, answer: Answer) -> None:
@@ -79,8 +83,13 @@ class Outbox:
         self.received, self._missing = answer.received, answer.missing
 
     def news(self) -> bytes | None:
-        """Give a status: by it the server sees what it misses, though no other report may come."""
-        return None if self.status is None else encode(replace(self.status, reports=len(self.reports)))
+        """Give a status: by it the server sees what it misses, though no other report may come; None for none."""
+        if self.status is None:
+            return None
+        try:
+            return encode(replace(self.status, reports=len(self.reports)))
+        except MessageError:  # a pose that is no number; the next one may be one
+            return None
 
     def due(self, now: float, allowance: Allowance) -> list[bytes]:
         """Give the reports to be sent now, oldest first: those that the server misses, and those never sent."""

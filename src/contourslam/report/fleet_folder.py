@@ -1,5 +1,7 @@
 """The folder of a fleet that was played: trajectories, common maps, metrics and a page about all of it."""
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from contourslam import __version__
-from contourslam.atomic import make_folder, write_text
+from contourslam.atomic import make_folder, remove, write_text
 from contourslam.fleet.play import Fleet
 from contourslam.fleet.server import Shared
+from contourslam.fleet.wire import NAME
 from contourslam.maps import save_map
 from contourslam.recordings import write_trajectory
 from contourslam.report.fleet_metrics import fleet_metrics, home
@@ -30,7 +33,7 @@ def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict
 
     The folder gets index.html, metrics.json, a map (commonN.cmap) and a picture (commonN.svg) of each common map, and
     of each robot NAME.tum, its poses at the end in the common map that it ended in, and NAME_online.tum, as it knew
-    them at the time.
+    them at the time. What an earlier fleet left there under such names is removed.
 
     Parameters
     ----------
@@ -51,6 +54,7 @@ def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict
         If a file cannot be written.
     """
     make_folder(folder)
+    _clear(folder)
     metrics = fleet_metrics(fleet)
     about = {"contourslam": __version__, "command": command}
     drawings = []
@@ -71,6 +75,21 @@ def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict
     return metrics
 
 
+def _clear(folder: Path) -> None:
+    """Remove the maps and trajectories of an earlier fleet: they would not belong to this one."""
+    for path in folder.glob("common*"):
+        if re.fullmatch(r"common\d+\.(cmap|svg)", path.name):
+            remove(path)
+    try:
+        names = [robot["name"] for robot in json.loads((folder / "metrics.json").read_text("utf-8"))["robots"]]
+    except (OSError, ValueError, TypeError, LookupError):  # of no fleet
+        return
+    for name in names:
+        if isinstance(name, str) and NAME.fullmatch(name):
+            remove(folder / f"{name}.tum")
+            remove(folder / f"{name}_online.tum")
+
+
 def _drawing(shared: Shared) -> Drawing:
     """Draw a common map with the ways of its robots; the runs of one that began anew have one colour."""
     ends = np.cumsum([0, *shared.counts])
@@ -87,6 +106,7 @@ def _page(fleet: Fleet, metrics: dict[str, Any], drawings: list[Drawing], comman
         *(_map(shared, one, drawing) for shared, one, drawing in zip(fleet.maps, maps, drawings, strict=True)),
         _robots(robots),
         _joined(metrics),
+        _faults(metrics["faults"]),
         Section("command", "Made by", verbatim(command)) if command else None,
     ]
     together = max((len(one["members"]) for one in maps), default=0)
@@ -188,6 +208,14 @@ def _joined(metrics: dict[str, Any]) -> Section:
         ]
         body += table("When pairs had seen the same room, and were joined", ["pair", "seen", "joined"], met)
     return Section("joined", "Who was joined", body)
+
+
+def _faults(faults: list[dict[str, Any]]) -> Section | None:
+    if not faults:
+        return None
+    rows = [Row(fault["robot"] or "server", [Cell(f"{fault['run']:x}"), Cell(fault["text"])]) for fault in faults]
+    words = paragraph("What robots told and could not be used, or was wrong with what the server had kept.")
+    return Section("faults", "Faults", words + table("Faults, the newest last", ["who", "run", "what"], rows))
 
 
 def _metres(value: float | None) -> str:

@@ -50,6 +50,7 @@ def fleet_metrics(fleet: Fleet) -> dict[str, Any]:
         "joined": [_of_joined(event) for event in fleet.joined],
         "met": [_of_pair(first, second, fleet) for first, second in combinations(begun, 2)],
         "faults": [asdict(fault) for fault in fleet.faults],
+        "server_restarts": fleet.restarts,
         "server_seconds": fleet.seconds,
         "solving_seconds": fleet.solving,
     }
@@ -69,6 +70,7 @@ def _of_robot(robot: Played, fleet: Fleet) -> dict[str, Any]:
         "scans": len(robot.told),
         "seconds": seconds,
         "runs": len({each.run for each in robot.told}),
+        "restarts": robot.restarts,
         "messages": robot.up.messages,
         "bytes": robot.up.size,
         "bytes_per_second": robot.up.size / max(seconds, 1e-9),
