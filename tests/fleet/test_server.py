@@ -162,13 +162,25 @@ def test_a_server_that_starts_anew_loses_nothing_and_doubles_nothing(
         first.tick(now)
     acknowledged = {(answer.robot, answer.received) for answer in first.answers()}
     inbox.close()
-    second = FleetServer(inbox=Inbox(tmp_path))
+    inbox = Inbox(tmp_path)
+    second = FleetServer(inbox=inbox)
     assert {(answer.robot, answer.received) for answer in second.answers()} == acknowledged
     run(second, messages[half - 20 :])  # some that were acknowledged come again
     (shared,) = second.settle()
     assert sum(shared.counts) == sum(joined.counts)
     for name, way in laid(shared).items():
         np.testing.assert_allclose(way[:, :2], laid(joined)[name][:, :2], atol=0.01)
+    (event,) = second.joined()
+    inbox.close()
+    third = FleetServer(inbox=Inbox(tmp_path))
+    third.tick(0.0)
+    (again,) = third.joined()  # and is there at once, without a search
+    assert (again.at, again.kept, again.gone, again.joint.evidence, third.search.looks) == (
+        event.at, event.kept, event.gone, event.joint.evidence, 0,
+    )  # fmt: skip
+    (shared,) = third.common_maps()
+    assert shared.number == event.kept
+    assert max(errors(shared, together).values()) < 0.02
 
 
 def test_unrelated_buildings_are_never_joined_and_each_robot_there_has_its_own_frame(

@@ -9,10 +9,10 @@ import numpy as np
 from contourslam.contour.contours import Floats
 from contourslam.fleet.common_kept import Bond, assemble
 from contourslam.fleet.runs import Identity, Run
-from contourslam.geometry.poses import between_one, compose, compose_one
+from contourslam.geometry.poses import between_one, compose, compose_one, inverse
 from contourslam.graph.places import ROBUST_TIES, Keyframe, Place, Places
 from contourslam.graph.pose_graph import PoseGraph
-from contourslam.joining.joint import Joint
+from contourslam.joining.joint import Joint, Tie
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.align import align
 from contourslam.matching.small import invert
@@ -233,6 +233,12 @@ class CommonMap:
             if tried == TRIED:
                 return
 
+    def laid_by(self, joint: Joint, other: "CommonMap") -> Joint:
+        """Give a joint of some time ago as its surest tie lays the other map now."""
+        surest = _surest(joint)
+        there = compose_one(self._poses[surest.first], surest.pose)
+        return replace(joint, pose=compose_one(there, inverse(other._poses[surest.second])))
+
     def absorb(self, other: "CommonMap", joint: Joint) -> None:
         """Take in another common map.
 
@@ -263,7 +269,7 @@ class CommonMap:
             information = invert(tie.covariance)
             self._relate(Bond(tie.first, tie.second + offset, tie.pose, information, ROBUST_TIES, True))
         # One tie stays whatever a refinement finds, so that no run ever hangs loose; held looser, for it counts twice.
-        surest = min(joint.ties, key=lambda tie: float(np.trace(tie.covariance[:2, :2])))
+        surest = _surest(joint)
         information = invert(surest.covariance) / LOOSER**2
         self._relate(Bond(surest.first, surest.second + offset, surest.pose, information, ROBUST_TIES, False))
         self._graph.update(STEPS_AFTER_JOINT)
@@ -308,3 +314,7 @@ class CommonMap:
             self._graph.recall(bond.first, bond.second, bond.pose, bond.information, bond.robust, tie=bond.tie, now=now)
         self._graph.update()
         self.refresh()
+
+
+def _surest(joint: Joint) -> Tie:
+    return min(joint.ties, key=lambda tie: float(np.trace(tie.covariance[:2, :2])))

@@ -64,6 +64,7 @@ class Inbox:
 
     Attributes
     ----------
+    folder : Path or None
     troubles : list of str
         What was wrong with the files that were found.
 
@@ -74,7 +75,7 @@ class Inbox:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._folder = folder
+        self.folder = folder
         self._shelves: dict[Source, _Shelf] = {}
         self._turns: dict[str, tuple[int, int]] = {}  # run of each robot that went on last, and how often others did
         self.troubles: list[str] = []
@@ -186,10 +187,10 @@ class Inbox:
 
     def _follow(self, shelf: _Shelf, report: Report, data: bytes) -> tuple[Report, ...]:
         """Keep the next report, and those that have waited for it."""
-        if self._folder is not None and shelf.journal is None:
+        if self.folder is not None and shelf.journal is None:
             # Numbered, so that runs are taken up in the order in which they came, and common maps keep their frames.
             name = f"{self._journals:06d}-{report.robot}-{report.run:016x}{SUFFIX}"
-            shelf.journal = Journal(self._folder / name)
+            shelf.journal = Journal(self.folder / name)
             self._journals += 1
         self._keep(shelf, data)
         out = [report]

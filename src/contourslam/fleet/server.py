@@ -4,6 +4,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -14,6 +15,7 @@ from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
 from contourslam.fleet.facts import Answer, KeyframeFact, Report
 from contourslam.fleet.inbox import Inbox, Source
+from contourslam.fleet.joints_kept import KeptJoint, Owner, keep_joint, kept_joints
 from contourslam.fleet.runs import Identity, Run
 from contourslam.fleet.server_search import Search
 from contourslam.fleet.wire import decode
@@ -142,6 +144,7 @@ class FleetServer:
         self._numbers = 0
         self._since: dict[int, float] = {}  # common maps in which keyframes wait, and since when
         self._solved: dict[int, int] = {}  # keyframes of each when it was solved as a whole
+        self._rejoined = list(self._kept_joints())  # that wait for their runs
         self._known: dict[Identity, Run] = {}  # who told of each keyframe first
         self._aside: set[Source] = set()
         self.search = Search()
@@ -215,6 +218,7 @@ class FleetServer:
         for common in list(self._commons.values()):
             if common.due or now >= self._since.get(common.number, now) + LATEST:
                 self._advance(common)
+        self._join_again()
         while len(self.search) and (until is None or self._clock() < until):
             found = self._look()
             if found is not None:
@@ -300,7 +304,41 @@ class FleetServer:
     def _site(self, common: CommonMap) -> str | None:
         return self._sites.get(common.runs[0].robot)
 
-    def _join(self, older: CommonMap, younger: CommonMap, joint: Joint, now: float) -> None:
+    def _kept_joints(self) -> Iterator[KeptJoint]:
+        if self._inbox.folder is not None:
+            try:
+                yield from kept_joints(self._inbox.folder)
+            except OSError as error:
+                self._note(Fault("", 0, f"the joints that were kept cannot be read ({error}); they are looked for"))
+
+    def _join_again(self) -> None:
+        """Join what was joined before this process began."""
+        if not self._rejoined:
+            return
+        for common in list(self._commons.values()):
+            self._advance(common)
+        for kept in self._rejoined:
+            older, younger = self._common_of(kept.first[0]), self._common_of(kept.second[0])
+            if older is None or younger is None or older.number >= younger.number:
+                continue
+            if self._site(older) != self._site(younger):
+                continue
+            joint = kept.renumbered(partial(self._key, older), partial(self._key, younger))
+            if joint.ties:
+                self._join(older, younger, older.laid_by(joint, younger), kept.at, keep=False)
+        self._rejoined = []
+
+    def _common_of(self, owner: Owner) -> CommonMap | None:
+        run = self._runs.get(owner[:2])
+        return None if run is None else self._where.get(run)
+
+    def _key(self, common: CommonMap, owner: Owner) -> int | None:
+        run = self._runs.get(owner[:2])
+        placed = run is not None and self._where.get(run) is common and owner[2] < len(run.keys)
+        return run.keys[owner[2]] if run is not None and placed else None
+
+    def _join(self, older: CommonMap, younger: CommonMap, joint: Joint, now: float, *, keep: bool = True) -> None:
+        kept = KeptJoint(now, joint, *_owners(older, younger, joint))
         event = Joined(now, older.number, younger.number, older.members, younger.members, joint)
         try:
             older.absorb(younger, joint)
@@ -309,6 +347,14 @@ class FleetServer:
             self._put_aside(younger, error)
             return
         older.joined += (event,)
+        if keep and self._inbox.folder is not None:
+            try:
+                keep_joint(self._inbox.folder, kept)
+            except OSError as error:
+                with self._lock:
+                    self._note(
+                        Fault("", 0, f"a joint cannot be kept ({error}); it is looked for again after a restart")
+                    )
         del self._commons[younger.number]
         for run in younger.runs:
             self._where[run] = older
@@ -425,3 +471,11 @@ def _shared(common: CommonMap, saved: SavedMap) -> Shared:
     index[[run.keys[number] for run in runs for number in run.own]] = np.arange(len(common))
     rows = tuple(index[run.keys] for run in runs)
     return Shared(common.number, members, tuple(len(run.own) for run in runs), saved, common.joined, rows)
+
+
+def _owners(older: CommonMap, younger: CommonMap, joint: Joint) -> Iterator[tuple[Owner, ...]]:
+    """Give the keyframes of both sides of a joint's ties, in the numbers of their runs."""
+    sides = (older, [tie.first for tie in joint.ties]), (younger, [tie.second for tie in joint.ties])
+    for common, keys in sides:
+        owners = (common.owners[key] for key in keys)
+        yield tuple((run.robot, run.number, number) for run, number in owners)
