@@ -22,6 +22,8 @@ from visualization_msgs.msg import MarkerArray
 
 from conftest import Processes
 from contourslam.evaluation.errors import align_first
+from contourslam.fleet.facts import Answer, Report
+from contourslam.fleet.wire import decode, encode
 from contourslam.geometry.poses import compose
 from contourslam.maps.file import load_map
 from contourslam.maps.saved_map import Contoured
@@ -31,11 +33,14 @@ from contourslam.scan import LaserScan, Odometry
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import ROOMS
 from contourslam.simulation.simulate import SimulatedRun, simulate
+from contourslam_ros.fleet_topics import QUALITY, answers_to
 
 CLOSE = 0.1  # m
 RATE = 1.5  # of the playing, against the clock
 # Both drive through the furnished room, and begin a third of a round apart.
 ROBOTS = "red", "blue"
+SITES = "red:room, blue:room, robot-1:elsewhere"
+FOREIGN = Report("robot-1", 1, 0, ())  # of a program that is none of ours: no topic may have this name
 
 
 @dataclass
@@ -120,6 +125,7 @@ class Seen:
     kept: Path
     markers: list[MarkerArray] = field(default_factory=list)
     ways: dict[str, Way] = field(default_factory=dict)
+    foreign: list[Answer] = field(default_factory=list)
 
     @property
     def number(self) -> str:
@@ -144,19 +150,30 @@ def seen(
     listener.node.create_subscription(MarkerArray, "/fleet/markers", seen.markers.append, LATCHED)
     for name in robots:
         listener.node.create_subscription(Way, f"/fleet/way/{name}", partial(seen.ways.__setitem__, name), LATCHED)
+    listener.node.create_subscription(
+        FleetPacket, answers_to(FOREIGN.robot), lambda m: seen.foreign.append(decode(bytes(m.data))), QUALITY
+    )
     rubbish = listener.node.create_publisher(FleetPacket, "/fleet/reports", 10)
+
+    def the_foreign_robot_is_answered() -> bool:
+        """Tell its report, again and again, until it is acknowledged."""
+        rubbish.publish(FleetPacket(data=array("B", encode(FOREIGN))))
+        return bool(seen.foreign) and seen.foreign[-1].received == 1
+
     try:
         node = blue.start()
         red.start()
         driving, first = red.play(0.0, 30.0), blue.play(2.0, 8.0)
         # The server comes after the robots, is killed while they drive, and comes back.
-        server = fleet.start("fleet_server", folder=folder / "kept")
+        server = fleet.start("fleet_server", folder=folder / "kept", sites=SITES)
         assert wait_for(lambda: all(int(r.told().get("acknowledged", 0)) > 0 for r in robots.values()), 60.0)
         rubbish.publish(FleetPacket(data=array("B", b"CF this is nothing that a robot would say")))
         assert wait_for(lambda: listener.said("refused in the last"), 10.0)
+        assert wait_for(the_foreign_robot_is_answered, 20.0)
         server.send_signal(signal.SIGKILL)
         server.wait(10.0)
-        fleet.start("fleet_server", folder=folder / "kept")
+        fleet.start("fleet_server", folder=folder / "kept", sites=SITES)
+        seen.foreign.clear()
         # A robot is started again: what it mapped until then is told by the node that ends, once there is a server.
         blue.played(first)
         seen.runs.append(blue.keyframes(folder))
@@ -174,6 +191,7 @@ def seen(
         seen.runs += [robot.keyframes(folder) for robot in robots.values()]
         time.sleep(3.0)  # a robot that stands still tells the last of it after two seconds
         assert wait_for(lambda: all(robot.all_is_acknowledged() for robot in robots.values()), 20.0)
+        assert wait_for(the_foreign_robot_is_answered, 20.0)  # though its topic is made of what was kept
         answer = listener.call(SaveMap, "fleet_server/save", path=str(seen.kept))
         assert answer.success, answer.message
         yield seen
@@ -231,6 +249,10 @@ def test_the_transforms_lead_from_the_common_map_to_that_of_the_robot(seen: Seen
 def test_rubbish_is_a_fault_in_the_diagnostics_and_nothing_else(seen: Seen) -> None:
     assert seen.server.said("refused in the last")
     assert "robots" in text(seen.server.latest("fleet_server: robots"))
+
+
+def test_a_robot_whose_name_ros_has_no_topics_for_is_answered_also_after_a_restart(seen: Seen) -> None:
+    assert {(answer.robot, answer.received) for answer in seen.foreign} == {("robot-1", 1)}
 
 
 def test_common_maps_and_ways_are_drawn(seen: Seen) -> None:
