@@ -37,7 +37,7 @@ def test_it_writes_the_report_and_says_what_can_be_said(tmp_path: Path, capsys: 
     there, out, document = results(tmp_path / "there"), tmp_path / "out", tmp_path / "doc.md"
     assert main(["sweep-report", str(there), "-o", str(out), "--markdown", str(document)]) == 0
     said = capsys.readouterr().out
-    assert "too few drives to show anything" in said and f"report: {out / 'index.html'}" in said
+    assert "No detector is shown to be better" in said and f"report: {out / 'index.html'}" in said
     assert EXPERIMENT.strip() in document.read_text() and "INCOMPLETE: 6 runs" in (out / "index.html").read_text()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contourslam.evaluation.paired_tests import by_drive, holm, judged, mean_interval, signed_rank
+from contourslam.evaluation.paired_tests import by_seed, holm, judged, mean_interval, signed_rank
 
 stats = pytest.importorskip("scipy.stats")
 Floats = NDArray[np.float64]
@@ -52,7 +52,7 @@ def test_cells_of_a_drive_are_pooled_for_taken_as_independent_they_mislead() -> 
     pooled, apart = [], []
     for _ in range(400):
         first, second = (np.repeat(rng.normal(size=20), 9) + 0.1 * rng.normal(size=180) for _ in range(2))
-        pooled.append(signed_rank(by_drive(names, first, second)).p <= 0.05)
+        pooled.append(signed_rank(by_seed(names, first, second)).p <= 0.05)
         apart.append(signed_rank(first - second).p <= 0.05)
     assert np.mean(pooled) <= 0.05 + 2.33 * np.sqrt(0.05 * 0.95 / 400)
     assert np.mean(apart) > 0.3
@@ -109,7 +109,7 @@ def test_a_failed_run_loses_and_one_that_both_failed_says_nothing() -> None:
     first, second = rng.normal(size=(2, 20))
     second[:15], first[15:17], second[15:17] = np.inf, np.inf, np.inf
     first[17] = np.nan
-    differences = by_drive(list(range(20)), first, second)
+    differences = by_seed(list(range(20)), first, second)
     assert len(differences) == 17
     (test,) = judged([signed_rank(differences)])
     assert test.verdict == "first better" and test.median == -np.inf
@@ -117,18 +117,24 @@ def test_a_failed_run_loses_and_one_that_both_failed_says_nothing() -> None:
 
 def test_a_drive_lost_by_each_somewhere_is_left_out() -> None:
     inf = np.inf
-    kept = by_drive(["a", "a", "b", "b"], np.array([inf, 0.0, inf, 1.0]), np.array([0.0, inf, 0.0, 0.0]))
+    kept = by_seed(["a", "a", "b", "b"], np.array([inf, 0.0, inf, 1.0]), np.array([0.0, inf, 0.0, 0.0]))
     assert kept.tolist() == [inf]
-    assert len(by_drive([], np.empty(0), np.empty(0))) == 0
+    assert len(by_seed([], np.empty(0), np.empty(0))) == 0
 
 
-def test_too_few_drives_are_said_to_be_too_few() -> None:
+def test_a_test_that_passed_is_not_called_one_of_too_few_seeds() -> None:
+    agreeing = -np.arange(1.0, 21.0)
+    verdicts = [test.verdict for test in judged([signed_rank(agreeing)] * 9 + [signed_rank(agreeing[:6])])]
+    assert verdicts == ["first better"] * 10
+
+
+def test_too_few_seeds_are_said_to_be_too_few() -> None:
     agreeing = -np.arange(1.0, 30.0)
     for pairs, least in ((1, 6), (10, 9), (30, 11)):
-        for n, expected in ((least - 1, "too few drives"), (least, "first better")):
+        for n, expected in ((least - 1, "too few seeds"), (least, "first better")):
             assert {test.verdict for test in judged([signed_rank(agreeing[:n])] * pairs)} == {expected}
     (nothing,) = judged([signed_rank(np.empty(0))])
-    assert nothing.verdict == "too few drives" and np.isnan(nothing.p)
+    assert nothing.verdict == "too few seeds" and np.isnan(nothing.p)
 
 
 def test_equal_drives_show_no_difference() -> None:

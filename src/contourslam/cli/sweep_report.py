@@ -50,6 +50,6 @@ class SweepReport:
             print_json(metrics)
         else:
             for measure in measures:
-                print(f"by the {measure.title}:", *metrics["findings"][measure.name], sep="\n  ")
+                print(f"by the {measure.title}:", *metrics["in_short"][measure.name], sep="\n  ")
             print(f"\nreport: {self.output / 'index.html'}")
         return 0

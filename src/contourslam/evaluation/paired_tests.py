@@ -1,9 +1,10 @@
 """Whether one thing is better than another over the same drives, and how sure a mean over drives is.
 
-The unit of chance is the drive: the same room and seed. What is measured on one drive several times, at other noise or
-with other beams, is alike, so differences are averaged within each drive before anything is tested. Two tested things
-are exchangeable on each drive where neither is better, which is all that the signed-rank test asks for. Holm's
-correction holds the chance of any false "better" in a table below the level, however many pairs the table has.
+The unit of chance is the seed. In a room it makes one drive; its drives in other rooms have the same errors of the
+wheels and the same stream of noise, so they are alike, as are measurements of one drive at other noise or with other
+beams. So differences are averaged within each seed before anything is tested. Two tested things are exchangeable on
+each seed where neither is better, which is all that the signed-rank test asks for. Holm's correction holds the chance
+of any false "better" in a table below the level, however many pairs the table has.
 
 Wilcoxon (1945), "Individual comparisons by ranking methods"; Holm (1979), "A simple sequentially rejective multiple
 test procedure"; Efron (1987), "Better bootstrap confidence intervals".
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from contourslam.evaluation.extras import require
 
 Floats = NDArray[np.float64]
-Verdict = Literal["first better", "second better", "no difference shown", "too few drives"]
+Verdict = Literal["first better", "second better", "no difference shown", "too few seeds"]
 
 LEVEL = 0.05
 """Chance of any false "better" in a table."""
@@ -28,7 +29,7 @@ DRAWS = 5000
 """Of a bootstrap."""
 FEWEST = 5
 """Values below which a mean gets no interval: a bootstrap of four knows too little."""
-_EXACT = 200  # drives up to which the distribution of the rank sum is taken exactly
+_EXACT = 200  # seeds up to which the distribution of the rank sum is taken exactly
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,27 +54,27 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class PairedTest:
-    """First minus second over the drives that both were measured on; smaller is better.
+    """First minus second over the seeds that both were measured with; smaller is better.
 
     Attributes
     ----------
     median : float
-        Median difference, one value a drive; infinite where most drives failed with one of the two only.
+        Median difference, one value a seed; infinite where with most seeds one of the two only failed.
     share : float
-        Part of the drives in which the first is the smaller one; equal ones count half.
-    drives : int
+        Part of the seeds with which the first is the smaller one; equal ones count half.
+    seeds : int
         How many there are.
     p : float
-        Two-sided, of the signed-rank test; NaN without a drive.
+        Two-sided, of the signed-rank test; NaN without a seed.
     corrected : float
         `p` after Holm's correction over the table.
     verdict : str
-        "too few drives" where even drives that all agree could not have passed the corrected test.
+        "too few seeds" where nothing is shown, and so many seeds could not have shown it alone even if all agreed.
     """
 
     median: float
     share: float
-    drives: int
+    seeds: int
     p: float
     corrected: float = math.nan
     verdict: Verdict = "no difference shown"
@@ -124,13 +125,13 @@ def mean_interval(values: Floats, *, probability: float = 0.95, draws: int = DRA
     return Interval(mean, low, high, n)
 
 
-def by_drive(drives: Sequence[Hashable], first: Floats, second: Floats) -> Floats:
-    """Mean difference of each drive, in the order in which the drives first come.
+def by_seed(seeds: Sequence[Hashable], first: Floats, second: Floats) -> Floats:
+    """Mean difference of each seed, in the order in which the seeds first come.
 
     Parameters
     ----------
-    drives : sequence, length n
-        Which drive each pair was measured on.
+    seeds : sequence, length n
+        Which seed each pair was measured with.
     first, second : ndarray, shape (n,)
         Costs. NaN is not known, and leaves the pair out; infinity is a failed run, which loses against any that was
         finished, and drops out where both failed.
@@ -138,14 +139,14 @@ def by_drive(drives: Sequence[Hashable], first: Floats, second: Floats) -> Float
     Returns
     -------
     ndarray, shape (d,)
-        A drive without any pair that is known is left out. A drive that each of the two failed on somewhere else is
-        left out, too: it does not say which is the better one.
+        A seed without any pair that is known is left out. One with which each of the two failed somewhere is left out,
+        too: it does not say which is the better one.
     """
     sums: dict[Hashable, list[float]] = {}
     with np.errstate(invalid="ignore"):
-        for drive, difference in zip(drives, (first - second).tolist(), strict=True):
+        for seed, difference in zip(seeds, (first - second).tolist(), strict=True):
             if not math.isnan(difference):
-                sums.setdefault(drive, []).append(difference)
+                sums.setdefault(seed, []).append(difference)
     means = np.array(
         [math.nan if {math.inf, -math.inf} <= set(one) else math.fsum(one) / len(one) for one in sums.values()]
     )
@@ -155,13 +156,13 @@ def by_drive(drives: Sequence[Hashable], first: Floats, second: Floats) -> Float
 def signed_rank(differences: Floats) -> PairedTest:
     """Test whether one of two things is better, by the Wilcoxon signed-rank test, without correction.
 
-    Drives on which both are equal say nothing and are dropped from the ranks, as Wilcoxon did. For up to 200 drives the
-    test is exact, also where some are tied, as drives on which one of the two failed are; above, it is approximated.
+    Seeds with which both are equal say nothing and are dropped from the ranks, as Wilcoxon did. For up to 200 seeds the
+    test is exact, also where some are tied, as those are with which one of the two failed; above, it is approximated.
 
     Parameters
     ----------
     differences : ndarray, shape (d,)
-        One a drive (:func:`by_drive`).
+        One a seed (:func:`by_seed`).
 
     Returns
     -------
@@ -204,7 +205,7 @@ def judged(tests: Sequence[PairedTest], *, level: float = LEVEL) -> list[PairedT
     Returns
     -------
     list of PairedTest
-        In the same order. "Better" needs more than half of the drives to agree, too.
+        In the same order. "Better" needs more than half of the seeds to agree, too.
     """
     corrected = holm([test.p for test in tests])
     tested = sum(not math.isnan(test.p) for test in tests)
@@ -215,14 +216,13 @@ def judged(tests: Sequence[PairedTest], *, level: float = LEVEL) -> list[PairedT
 
 
 def _verdict(test: PairedTest, corrected: float, level: float, tested: int) -> Verdict:
-    if 2.0 ** (1 - test.drives) * max(tested, 1) > level:
-        return "too few drives"
-    if not corrected <= level or test.share == 0.5 or test.median == 0.0:
+    if corrected <= level:
+        if test.share > 0.5 and test.median < 0.0:
+            return "first better"
+        if test.share < 0.5 and test.median > 0.0:
+            return "second better"
         return "no difference shown"
-    smaller = test.share > 0.5
-    if smaller != (test.median < 0.0):
-        return "no difference shown"
-    return "first better" if smaller else "second better"
+    return "too few seeds" if 2.0 ** (1 - test.seeds) * max(tested, 1) > level else "no difference shown"
 
 
 def _median(differences: Floats) -> float:

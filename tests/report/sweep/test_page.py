@@ -20,7 +20,7 @@ POSITION = [MEASURES["position"]]
 def report(tmp_path_factory: pytest.TempPathFactory, sweep_rows, log_rows) -> Path:
     """A report in which the matched filter is better by a fifth, and two of its runs failed."""
     folder = tmp_path_factory.mktemp("report")
-    rows = sweep_rows((0.8, 1.0, 1.0, 1.0), failed=[("matched_filter", 3)])
+    rows = sweep_rows((0.8, 1.0, 1.0, 1.0), seeds=16, failed=[("matched_filter", 3)])
     sweep = sweep_of([*rows, *log_rows], ["name = 'of & tests'"], expected=len(rows) + len(log_rows) + 7)
     write_sweep_report(folder, sweep, POSITION, command="contourslam sweep-report out/sweep -o out/report")
     return folder
@@ -30,7 +30,7 @@ def test_better_is_said_only_where_a_test_says_so(report: Path) -> None:
     metrics = json.loads((report / "metrics.json").read_text())
     (together,) = [line for line in metrics["findings"]["position"] if "2 rooms and 5 conditions together" in line]
     assert sum("over all its 5 conditions" in line for line in metrics["findings"]["position"]) == 2
-    assert "Matched filter is better than" in together and together.count("better") == 1
+    assert "Matched filter is better than" in together and together.count("better") == 1 and "16 seeds" in together
     assert {pair["better"] for pair in metrics["pairs"]["pairs_position_corners"]} == {"matched_filter", None}
     page = (report / "index.html").read_text()
     assert page.count('<td class="better">matched filter is better') == sum(
@@ -84,7 +84,7 @@ def test_few_drives_of_one_detector_are_reported_without_a_claim(sweep_rows, tmp
     metrics = write_sweep_report(tmp_path, sweep_of(rows), [MEASURES["heading"]])
     assert all("better" not in line for line in metrics["findings"]["heading"])
     two = write_sweep_report(tmp_path, sweep_of(sweep_rows(seeds=2)), POSITION)
-    assert "Too few drives to show anything" in two["findings"]["position"][1]
+    assert "Too few seeds to show anything" in two["findings"]["position"][1]
 
 
 def test_by_several_metrics_each_is_tested_and_the_first_is_drawn(sweep_rows, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_document_gets_the_report_in_its_places_and_keeps_its_words(sweep_rows
 def test_without_a_document_all_of_the_report_is_written(sweep_rows, log_rows, tmp_path: Path) -> None:
     write_markdown(tmp_path / "new.md", sweep_of([*sweep_rows(), *log_rows]), POSITION, command="contourslam x")
     titles = re.findall(r"^## (.*)", (tmp_path / "new.md").read_text(), re.MULTILINE)
-    assert titles[0] == "What can be said" and titles[-1] == "Reproduce this" and len(titles) == 9
+    assert titles[:2] == ["In short", "What can be said"] and titles[-1] == "Reproduce this" and len(titles) == 10
 
 
 def test_a_place_for_what_was_not_run_says_so(log_rows, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from contourslam.report.sweep.figures import curves
-from contourslam.report.sweep.findings import of_all
+from contourslam.report.sweep.findings import Comparison, in_short, sentence
 from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.reading import sweep_of
 from contourslam.report.sweep.statistics import pairs, summary, wheels
@@ -22,14 +22,24 @@ def test_a_detector_that_is_better_is_shown_to_be_and_by_how_much(sweep_rows) ->
     assert better(found) == {("matched_filter", "")}
     won = [pair for pair in found if pair.better]
     assert len(won) == 3
-    assert all(pair.effect == pytest.approx(-0.2, abs=0.02) and pair.test.drives == 24 for pair in won)
+    assert all(pair.effect == pytest.approx(-0.2, abs=0.02) and pair.test.seeds == 12 for pair in won)
 
 
-def test_the_drives_count_and_not_the_cells(sweep_rows) -> None:
+def test_the_seeds_count_and_neither_cells_nor_rooms(sweep_rows) -> None:
     sweep = sweep_of(sweep_rows(seeds=12))
-    for places, drives in ((sweep.rooms, 24), (sweep.rooms[:1], 12)):
+    for places in (sweep.rooms, sweep.rooms[:1]):
         found = pairs(sweep, POSITION, [("", places)], sweep.conditions("corners"))
-        assert {pair.test.drives for pair in found} == {drives}
+        assert {pair.test.seeds for pair in found} == {12}
+
+
+def test_rooms_whose_seeds_share_their_chance_are_no_further_evidence(sweep_rows) -> None:
+    rows = sweep_rows(seeds=20, rooms=("furnished_room",), conditions=[(0.01, 500)])
+    copies = [row | {"room": room} for row in rows for room in ("furnished_room", "office_corridor", "large_hall")]
+    one, three = (
+        pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+        for sweep in (sweep_of(rows), sweep_of(copies))
+    )
+    assert [pair.test.p for pair in three] == pytest.approx([pair.test.p for pair in one])
 
 
 def test_equal_detectors_are_not_told_apart(sweep_rows) -> None:
@@ -105,12 +115,39 @@ def test_a_measure_that_is_not_there_is_not_known() -> None:
     [
         ((0.8, 1.0, 1.0, 1.0), "Matched filter is better than Wu, Teh-Chin and CSS (by "),
         ((1.0, 1.0, 1.3, 1.0), "Matched filter, Wu and CSS are better than Teh-Chin (by "),
-        ((1.0, 1.0, 1.0, 1.0), "No difference shown (intervals of the difference reach to "),
+        ((1.0, 1.0, 1.0, 1.0), "No difference shown (each pair's own 95 % interval, uncorrected: within "),
     ],
 )
 def test_findings_name_those_that_differ_and_how_far(sweep_rows, factors: tuple[float, ...], said: str) -> None:
     sweep = sweep_of(sweep_rows(factors))
     found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
-    sentence = of_all("corners", found, 5, 2, POSITION)
-    assert sentence.startswith(f"corners, 2 rooms and 5 conditions together, 24 drives. {said}")
-    assert sentence.endswith(" %).") and sentence.count("better") <= 1
+    told = sentence(Comparison("corners", "2 rooms and 5 conditions together", found), POSITION)
+    assert told.startswith(f"corners, 2 rooms and 5 conditions together, 12 seeds. {said}")
+    others = " No other difference is shown."
+    assert told.endswith(others) == ("better" in told) and told.removesuffix(others).endswith(" %).")
+    assert told.count("better") <= 1
+
+
+def test_differences_that_failures_made_infinite_are_said_to_be_left_out(sweep_rows) -> None:
+    for failed in ([], [("wu", 0)]):
+        sweep = sweep_of(sweep_rows(failed=failed))
+        found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+        assert ("without the seeds" in sentence(Comparison("corners", "all", found), POSITION)) == bool(failed)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ((0.8, 1.0, 1.0, 1.0), "Better than every other: matched filter (corners, both)."),
+        ((1.0, 1.0, 1.3, 1.0), "Worse than every other: Teh-Chin (corners, both)."),
+        ((1.0, 1.0, 1.0, 1.0), "No detector is shown to be better than another in 1 comparison "),
+    ],
+)
+def test_the_short_answer_names_the_best_the_worst_and_the_largest_difference(sweep_rows, factors, said: str) -> None:
+    sweep = sweep_of(sweep_rows(factors))
+    found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
+    told = in_short([Comparison("corners", "both", found)], POSITION)
+    assert any(line.startswith(said) for line in told)
+    sizes = [line for line in told if line.startswith("The largest difference shown: ")]
+    assert len(sizes) == (factors != (1.0, 1.0, 1.0, 1.0))
+    assert all("Teh-Chin has 3" in line for line in sizes if factors[2] == 1.3)

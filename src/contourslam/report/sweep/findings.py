@@ -2,37 +2,107 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from contourslam.report.naming import label
 from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import Pair
-from contourslam.report.sweep.values import Condition
 
 
-def of_rooms(condition: Condition, found: Sequence[Pair], rooms: Sequence[str], measure: Measure) -> str:
-    """Say room by room which detectors are shown to be better than which under one condition."""
-    said = [f"{label(room)}: {_said([pair for pair in found if pair.place == room], measure)}" for room in rooms]
-    return f"{label(condition.setting)}, {condition.name}. {' '.join(map(_capital, said))}"
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All pairs of detectors over the same drives.
+
+    Attributes
+    ----------
+    setting : str
+    where : str
+        Rooms and conditions in words.
+    pairs : sequence of Pair
+    """
+
+    setting: str
+    where: str
+    pairs: Sequence[Pair]
+
+    @property
+    def name(self) -> str:
+        """Setting and drives."""
+        return f"{label(self.setting)}, {self.where}"
+
+    @property
+    def seeds(self) -> int:
+        """With how many both detectors of a pair were measured, at most."""
+        return max((pair.test.seeds for pair in self.pairs), default=0)
+
+    @property
+    def shown(self) -> list[Pair]:
+        """Pairs of which one is shown to be better."""
+        return [pair for pair in self.pairs if pair.better is not None]
+
+    def said(self, measure: Measure) -> str:
+        """Say who is shown to be better than whom, and by how much."""
+        return _capital(_said(self.pairs, measure))
 
 
-def of_axes(setting: str, room: str, found: Sequence[Pair], conditions: int, measure: Measure) -> str:
-    """Say the same of a room over all conditions that a setting was run on there."""
-    drives = max((pair.test.drives for pair in found), default=0)
-    over = f"{label(room)} over all its {conditions} conditions, {drives} drives"
-    return f"{label(setting)}, {over}. {_capital(_said(found, measure))}"
+def sentence(tested: Comparison, measure: Measure) -> str:
+    """Say of which drives, and what their tests show."""
+    return f"{tested.name}, {counted(tested.seeds, 'seed')}. {tested.said(measure)}"
 
 
-def of_all(setting: str, found: Sequence[Pair], conditions: int, rooms: int, measure: Measure) -> str:
-    """Say the same over everything that a setting was run on."""
-    drives = max((pair.test.drives for pair in found), default=0)
-    over = f"{counted(rooms, 'room')} and {counted(conditions, 'condition')} together, {drives} drives"
-    return f"{label(setting)}, {over}. {_capital(_said(found, measure))}"
+def in_short(found: Sequence[Comparison], measure: Measure) -> list[str]:
+    """Say in a few sentences what all comparisons by a measure come to.
+
+    Parameters
+    ----------
+    found : sequence of Comparison
+        One or more.
+    measure : Measure
+    """
+    of = f"{counted(len(found), 'comparison')} (a setting in a room, or in all rooms)"
+    if not any(one.shown for one in found):
+        return [f"No detector is shown to be better than another in {of}."]
+    best = {one.name: name for one in found if (name := _alone(one, lambda pair: str(pair.better)))}
+    worst = {one.name: name for one in found if (name := _alone(one, _loser))}
+    said = [
+        f"Better than every other: {_places(best)}." if best else f"No detector is better than every other in {of}."
+    ]
+    if worst:
+        said.append(f"Worse than every other: {_places(worst)}.")
+    sizes = [(_larger(pair), one, pair) for one in found for pair in one.shown if math.isfinite(pair.test.median)]
+    if sizes:
+        size, one, pair = max(sizes, key=lambda each: each[0])
+        told = f"{_names([_loser(pair)])} has {_amount(size, measure)} more than {label(str(pair.better))}"
+        said.append(f"The largest difference shown: {told} ({one.name}).")
+    nothing = [one.name for one in found if not one.shown]
+    if nothing:
+        said.append(f"No difference is shown in {len(nothing)} of {len(found)}: {'; '.join(nothing)}.")
+    return said
+
+
+def _alone(one: Comparison, key: Callable[[Pair], str]) -> str | None:
+    """Detector that is better, or worse, than every other."""
+    detectors = {name for pair in one.pairs for name in (pair.first, pair.second)}
+    groups = _grouped(one.shown, key)
+    return next((name for name, group in groups.items() if len(group) == len(detectors) - 1), None)
+
+
+def _places(names: Mapping[str, str]) -> str:
+    detectors = dict.fromkeys(names.values())
+    return ", ".join(
+        f"{label(name)} ({'; '.join(place for place, other in names.items() if other == name)})" for name in detectors
+    )
+
+
+def _larger(pair: Pair) -> float:
+    """By how much the worse one's error is larger, in the median over the seeds."""
+    return pair.plain(abs(pair.test.median))
 
 
 def counted(count: int, word: str) -> str:
     """Number and word, in the plural where there are several."""
-    return f"{count} {word}{'s' * (count != 1)}"
+    return f"{count:,} {word}{'s' * (count != 1)}"
 
 
 def _capital(text: str) -> str:
@@ -42,8 +112,8 @@ def _capital(text: str) -> str:
 def _said(found: Sequence[Pair], measure: Measure) -> str:
     shown = [pair for pair in found if pair.better is not None]
     if not shown:
-        few = {pair.test.verdict for pair in found} == {"too few drives"}
-        return "too few drives to show anything." if few else f"no difference shown{_reach(found, measure)}."
+        few = {pair.test.verdict for pair in found} == {"too few seeds"}
+        return "too few seeds to show anything." if few else f"no difference shown{_reach(found, measure)}."
     winners, losers = _grouped(shown, lambda pair: str(pair.better)), _grouped(shown, _loser)
     if len(winners) <= len(losers):
         said = [f"{label(name)} is better than {_names(map(_loser, group))}" for name, group in winners.items()]
@@ -55,7 +125,7 @@ def _said(found: Sequence[Pair], measure: Measure) -> str:
             said.append(f"{_names(str(pair.better) for pair in group)} {verb} better than {label(name)}")
         groups = losers
     sized = [f"{text}{_size(group, measure)}" for text, group in zip(said, groups.values(), strict=True)]
-    return f"{'; '.join(sized)}."
+    return f"{'; '.join(sized)}.{' No other difference is shown.' * (len(shown) < len(found))}"
 
 
 def _grouped(found: Sequence[Pair], key: Callable[[Pair], str]) -> dict[str, list[Pair]]:
@@ -66,14 +136,17 @@ def _grouped(found: Sequence[Pair], key: Callable[[Pair], str]) -> dict[str, lis
 
 
 def _reach(found: Sequence[Pair], measure: Measure) -> str:
-    """Tell how large a difference may still be that was not shown, as far as the intervals know."""
+    """Tell how far the intervals of differences reach that were not shown."""
     ends = [pair.plain(end) for pair in found for end in (pair.interval.low, pair.interval.high)]
     known = [abs(end) for end in ends if math.isfinite(end)]
-    return f" (intervals of the difference reach to {_amount(max(known), measure)})" if known else ""
+    if not known:
+        return ""
+    without = ", without the seeds that a run failed with" if any(pair.lost for pair in found) else ""
+    return f" (each pair's own 95 % interval, uncorrected{without}: within {_amount(max(known), measure)})"
 
 
 def _size(found: Sequence[Pair], measure: Measure) -> str:
-    """Tell by how much the better ones are better, in the median over the drives."""
+    """Tell by how much the better ones are better, in the median over the seeds."""
     signs = [1.0 if pair.better == pair.first else -1.0 for pair in found]
     sizes = [-pair.plain(sign * pair.test.median) for pair, sign in zip(found, signs, strict=True)]
     known = sorted(size for size in sizes if math.isfinite(size))
@@ -97,21 +170,30 @@ def _names(names: Iterable[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def beside_the_paper(means: Mapping[str, float], room: str) -> str | None:
-    """Hold the spread between the paper's four detectors against the one in its Table I; None without all four.
+def beside_the_paper(means: Mapping[str, Mapping[str, float]], room: str) -> str | None:
+    """Hold the spread between the paper's four detectors against the one in its Table I.
 
     Parameters
     ----------
-    means : mapping of str to float
-        RMSE of the position of each detector in the room, m.
+    means : mapping of str to mapping of str to float
+        Mean RMSE of the position of each detector by the setting, m.
     room : str
+
+    Returns
+    -------
+    str or None
+        None where no setting has all four.
     """
-    theirs = {name: math.hypot(row["x"], row["y"]) for name, row in PAPER.items()}
-    ours = [means[name] for name in theirs if math.isfinite(means.get(name, math.nan))]
-    if len(ours) < len(theirs) or min(ours) <= 0.0:
+    theirs = [math.hypot(row["x"], row["y"]) for row in PAPER.values()]
+    ours = {
+        setting: values
+        for setting, mean in means.items()
+        if (values := [mean.get(name, math.nan) for name in PAPER]) and all(value > 0.0 for value in values)
+    }
+    if not ours:
         return None
-    paper = max(theirs.values()) / min(theirs.values())
+    said = ", ".join(f"{max(values) / min(values):.2f} ({label(setting)})" for setting, values in ours.items())
     return (
-        f"Between the best and the worst of the paper's four detectors lies a factor of {max(ours) / min(ours):.2f} in "
-        f"the mean RMSE of the position in the {label(room)}; in the paper's Table I, of one drive, it is {paper:.1f}."
+        f"The mean error of the worst of the paper's four detectors over that of the best, in the {label(room)} where "
+        f"the sweep's axes cross: {said}. In the paper's Table I, of one drive: {max(theirs) / min(theirs):.1f}."
     )

@@ -1,8 +1,8 @@
 """The report of a sweep: a page that opens offline, its tables as CSV and LaTeX, its figures as SVG, numbers as JSON.
 
-``metrics.json`` has ``findings`` as sentences by metric; ``cells`` with each setting, room, noise, beams and detector:
-runs, failed runs, and of each measure mean, low, high and count; ``pairs`` with every test, those of a table under its
-name; and ``recordings`` with the figures of the real ones.
+``metrics.json`` has ``in_short`` and ``findings`` as sentences by metric; ``cells`` with each setting, room, noise,
+beams and detector: runs, failed runs, and of each measure mean, low, high and count; ``pairs`` with every test, those
+of a table under its name; and ``recordings`` with the figures of the real ones.
 """
 
 import re
@@ -22,7 +22,7 @@ from contourslam.report.sweep.parts import Parts
 from contourslam.report.sweep.statistics import Pair, summary
 from contourslam.report.sweep.values import Sweep
 
-_OWN = re.compile(r"(table_one|paper|cells|matrix|pairs|logs|failures|noise|beams)(_.*)?\.(csv|tex|svg)")
+_OWN = re.compile(r"(findings|table_one|paper|cells|matrix|pairs|logs|failures|noise|beams)(_.*)?\.(csv|tex|svg)")
 """What an earlier report may have left in ``tables/`` and ``figures/``."""
 
 
@@ -85,6 +85,7 @@ def sweep_metrics(parts: Parts) -> dict[str, Any]:
         "runs": len(sweep.runs),
         "failed": len(sweep.failed),
         "expected": sweep.expected,
+        "in_short": {measure.name: parts.in_short(measure) for measure in parts.measures},
         "findings": {measure.name: parts.sentences(measure) for measure in parts.measures},
         "cells": [
             {

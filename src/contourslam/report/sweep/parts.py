@@ -9,19 +9,26 @@ from contourslam.report.naming import label
 from contourslam.report.sweep import findings, tables
 from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Part, Points, Table, Words
 from contourslam.report.sweep.figures import AxisName, curves, curves_drawing
+from contourslam.report.sweep.findings import Comparison
 from contourslam.report.sweep.measures import MEASURES, Measure
 from contourslam.report.sweep.statistics import Tests, pairs, summary
 from contourslam.report.sweep.values import Sweep, once
 
 HOW = (
-    "The unit of chance is the drive, a room and a seed: what was measured on one drive under several conditions is "
-    "averaged before it is tested, so that it counts once. Pairs of detectors are tested by the Wilcoxon signed-rank "
-    "test, exact and two-sided, over the drives that both were run on, and the p-values of all pairs in a table are "
-    "corrected by Holm's method: the chance that a table holds any false “better” is at most 5 %. Where a pair does "
-    "not pass, no difference is shown, which is not to say that there is none. A failed run counts as worse than any "
-    "finished one. Intervals are BCa bootstrap intervals of the mean (5000 draws, seed 0): called 95 %, they hold the "
-    "true mean some 92 times in 100 with 20 drives, and less often where errors are skewed. The test is of ranks, the "
-    "interval of the mean: a single bad drive moves the second only."
+    "The unit of chance is the seed. In a room it makes one drive; its drives in other rooms have the same errors of "
+    "the wheels and the same stream of noise, so they are alike and no further evidence. What was measured with one "
+    "seed under several conditions and in several rooms is averaged before it is tested: it counts once. Pairs of "
+    "detectors are tested by the Wilcoxon signed-rank test, exact and two-sided, over the seeds that both were run "
+    "with, and the p-values of all pairs in a table are corrected by Holm's method: the chance that a table holds any "
+    "false “better” is at most 5 %. Where a pair does not pass, no difference is shown, which is not to say that there "
+    "is none; the interval named there is the widest of the pairs' own, and no bound on all of them at once. "
+    "Intervals are BCa bootstrap intervals of the mean (5000 draws, seed 0): called 95 %, they hold the true mean some "
+    "92 times in 100 with 20 seeds, and less often where errors are skewed. The test is of ranks, the interval of the "
+    "mean: a single bad drive moves the second only."
+)
+LOST = (
+    "A failed run counts as worse than any finished one. Such a difference is infinite: the tests take it in, the "
+    "intervals leave its seed out."
 )
 TIMES = (
     "Times per scan were taken while other runs, and maybe other programs, worked on the same machine: they are good "
@@ -59,6 +66,7 @@ class Parts:
     def all(self) -> list[Part]:
         """Give all of them; one of which nothing was run has no items."""
         return [
+            self._answer(),
             self._findings(),
             self._design(),
             self._table_one(),
@@ -70,40 +78,64 @@ class Parts:
             self._reproduce(),
         ]
 
+    def tested(self, measure: Measure) -> list[Comparison]:
+        """All comparisons by a measure: each setting in each room and over its conditions, and in all rooms."""
+        sweep, found = self.sweep, []
+        for setting in sweep.settings:
+            key = measure.name, setting
+            if centre := sweep.centre(setting):
+                found += [
+                    Comparison(setting, f"{label(room)}, {centre.name}", mine)
+                    for room in sweep.rooms
+                    if (mine := [pair for pair in self.by_room[key] if pair.place == room])
+                ]
+            found += [
+                Comparison(
+                    setting, f"{label(room)} over all its {len(sweep.conditions(setting, room))} conditions", mine
+                )
+                for room in sweep.rooms
+                if (mine := [pair for pair in self.over_axes[key] if pair.place == room])
+            ]
+            common = findings.counted(len(sweep.common(setting)), "condition")
+            if sweep.common(setting) and len(sweep.rooms) > 1 and self.together[key]:
+                where = f"{findings.counted(len(sweep.rooms), 'room')} and {common} together"
+                found.append(Comparison(setting, where, self.together[key]))
+        return found
+
     def sentences(self, measure: Measure) -> list[str]:
         """What can be said of the simulated drives by a measure."""
-        sweep, said = self.sweep, []
+        return [findings.sentence(one, measure) for one in self.tested(measure)]
+
+    def in_short(self, measure: Measure) -> list[str]:
+        """The same in a few sentences, beside what the paper found."""
+        found = self.tested(measure)
+        return (findings.in_short(found, measure) if found else []) + self._beside_the_paper(measure)
+
+    def _beside_the_paper(self, measure: Measure) -> list[str]:
+        if measure.name != "position":
+            return []
+        sweep, means = self.sweep, {}
         for setting in sweep.settings:
             if centre := sweep.centre(setting):
-                said.append(findings.of_rooms(centre, self.by_room[measure.name, setting], sweep.rooms, measure))
-            said += [
-                findings.of_axes(setting, room, found, len(sweep.conditions(setting, room)), measure)
-                for room in sweep.rooms
-                if (found := [pair for pair in self.over_axes[measure.name, setting] if pair.place == room])
-            ]
-            conditions = len(sweep.common(setting))
-            if conditions and len(sweep.rooms) > 1:
-                found = self.together[measure.name, setting]
-                said.append(findings.of_all(setting, found, conditions, len(sweep.rooms), measure))
-        if measure.name == "position" and (beside := self._beside_the_paper()) is not None:
-            said.append(beside)
-        return said
+                cells = {name: summary(sweep.cell(sweep.rooms[0], centre, name), measure) for name in sweep.detectors}
+                means[setting] = {name: found.interval.mean for name, found in cells.items()}
+        said = findings.beside_the_paper(means, sweep.rooms[0]) if means else None
+        return [] if said is None else [said]
 
-    def _beside_the_paper(self) -> str | None:
-        sweep = self.sweep
-        centre = sweep.centre(sweep.settings[0]) if sweep.settings else None
-        if centre is None:
-            return None
-        room, position = sweep.rooms[0], MEASURES["position"]
-        means = {name: summary(sweep.cell(room, centre, name), position).interval.mean for name in sweep.detectors}
-        return findings.beside_the_paper(means, room)
+    def _answer(self) -> Part:
+        items: list[Item] = []
+        for measure in self.measures:
+            if said := self.in_short(measure):
+                items += [Heading(f"By the {measure.title}"), Points(said)]
+        return Part("answer", "In short", items)
 
     def _findings(self) -> Part:
         items: list[Item] = []
         if self.sweep.simulated:
-            for measure in self.measures:
-                items += [Words(f"By the {measure.title}:"), Points(self.sentences(measure))]
+            items += [tables.findings_table(found, one) for one in self.measures if (found := self.tested(one))]
             items.append(Words(HOW, note=True))
+        if any(run.simulated for run in self.sweep.failed):
+            items.append(Words(LOST, note=True))
         return Part("findings", "What can be said", items)
 
     def _design(self) -> Part:
@@ -203,7 +235,7 @@ class Parts:
         sweep, of = self.sweep, f"{label(setting)}, by {measure.title}"
         together, apart = self.together[measure.name, setting], self.by_room[measure.name, setting]
         end, common = f"{measure.name}_{setting}", findings.counted(len(sweep.common(setting)), "condition")
-        share = f"{of}, all rooms and {common}: share of the drives in which the row's detector is better"
+        share = f"{of}, all rooms and {common}: share of the seeds with which the row's detector is better"
         every = f"{of}, all rooms and {common}"
         table = tables.pairs_table(together, measure, f"pairs_{end}", every)
         items: list[Item] = [tables.matrix_table(sweep, together, f"matrix_{end}", share)]
@@ -220,8 +252,7 @@ class Parts:
 
     def _logs(self) -> Part:
         if not self.sweep.recorded:
-            words = Words("No real recording is among these results.")
-            return Part("logs", "Real recordings", [words])
+            return Part("logs", "Real recordings", [])
         table: Table = tables.logs_table(self.sweep, [MEASURES["relations"], MEASURES["turns"]])
         words = Words(
             "A recording is one drive and the replay of it has no chance in it: one number each, no interval, no test. "

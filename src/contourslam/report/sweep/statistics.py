@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contourslam.evaluation.paired_tests import (
     Interval,
     PairedTest,
-    by_drive,
+    by_seed,
     judged,
     mean_interval,
     signed_rank,
@@ -55,7 +55,7 @@ class Pair:
     test : PairedTest
         Of the natural logarithms where the measure is compared by its ratio.
     interval : Interval
-        Of the mean difference, likewise, over the drives that neither failed on.
+        Of the mean difference, likewise, over the seeds with which neither failed.
     ratio : bool
         Whether it is.
     lost : int
@@ -120,7 +120,8 @@ def pairs(
 ) -> list[Pair]:
     """Test every two detectors in each group of places, corrected for all tests together.
 
-    What a drive was measured with under several conditions is averaged first, so that a drive counts once.
+    What was measured with one seed under several conditions and in several rooms is averaged first, so that a seed
+    counts once: its drives in several rooms share the errors of the wheels and the stream of noise.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def pairs(
     Returns
     -------
     list of Pair
-        Group by group; pairs that share no drive are among them, with nothing shown.
+        Group by group; pairs that share no seed are among them, with nothing shown.
     """
     found: list[Pair] = []
     for name, places in groups:
@@ -143,7 +144,7 @@ def pairs(
             shared = [key for key in one if key in other]
             values = [np.array([cost[key] for key in shared], dtype=np.float64) for cost in (one, other)]
             lost = int(sum(np.isinf(value).sum() for value in values))
-            differences = by_drive([drive for drive, _ in shared], *values)
+            differences = by_seed([drive.seed for drive, _ in shared], *values)
             test, interval = signed_rank(differences), mean_interval(differences)
             found.append(Pair(name, first, second, test, interval, measure.ratio, lost))
     tests = judged([pair.test for pair in found])

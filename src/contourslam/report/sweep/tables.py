@@ -7,6 +7,7 @@ from contourslam.report.naming import label
 from contourslam.report.page.markup import Cell, Row
 from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.content import Table
+from contourslam.report.sweep.findings import Comparison
 from contourslam.report.sweep.measures import MEASURES, TABLE_I, Measure
 from contourslam.report.sweep.statistics import Pair, Summary, Tests, summary, wheels
 from contourslam.report.sweep.values import Condition, Sweep
@@ -41,6 +42,13 @@ def table_one(sweep: Sweep, measures: Sequence[Measure], setting: str, condition
     what = "RMSE of position, x, y and heading, and what else was measured"
     caption = f"{label(setting)}, {condition.name}. {what}: mean over the drives and its 95 % interval"
     return Table(f"table_one_{setting}", caption, headers, rows)
+
+
+def findings_table(found: Sequence[Comparison], measure: Measure) -> Table:
+    """What each comparison shows, in words."""
+    rows = [Row(one.name, [Cell(str(one.seeds)), Cell(one.said(measure))]) for one in found]
+    caption = f"By the {measure.title}: what the tests show, each line corrected for all pairs of its table"
+    return Table(f"findings_{measure.name}", caption, ["setting, drives", "seeds", "shown"], rows)
 
 
 def paper_table() -> Table:
@@ -78,7 +86,7 @@ def pairs_table(found: Sequence[Pair], measure: Measure, name: str, caption: str
         f"{effect}, median",
         "mean, 95 % interval",
         "first smaller in",
-        "drives",
+        "seeds",
         "p",
         "p after Holm",
         "shown",
@@ -92,7 +100,7 @@ def pairs_table(found: Sequence[Pair], measure: Measure, name: str, caption: str
             Cell(effect_text(pair, measure)),
             Cell(" to ".join(_signed(pair, measure, end) for end in bounds) + unit if known else "–"),
             Cell("–" if math.isnan(test.share) else f"{100 * test.share:.0f} %"),
-            Cell(str(test.drives)),
+            Cell(str(test.seeds)),
             Cell(p_text(test.p)),
             Cell(p_text(test.corrected)),
             Cell(f"{label(pair.better)} is better" if pair.better else test.verdict, better=bool(pair.better)),
@@ -104,7 +112,7 @@ def pairs_table(found: Sequence[Pair], measure: Measure, name: str, caption: str
 
 
 def matrix_table(sweep: Sweep, found: Sequence[Pair], name: str, caption: str) -> Table:
-    """Share of the drives in which the detector of a row is better than that of a column."""
+    """Share of the seeds with which the detector of a row is better than that of a column."""
     shares = {}
     for pair in found:
         shares[pair.first, pair.second] = pair.test.share, pair.better == pair.first

@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, order=True)
 class Drive:
-    """What chance decided once: the unit of all statistics.
+    """What chance decided once: one value of each mean of a cell.
 
     Attributes
     ----------
