@@ -3,6 +3,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,12 +14,13 @@ pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
 from contourslam.cli import main
+from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.cli.locate import UNSURE
 from contourslam.cli.merge import Verdict
 from contourslam.config import Config
 from contourslam.geometry.poses import between, interpolate
 from contourslam.graph import GraphSlam, kept
-from contourslam.joining import find
+from contourslam.joining import find, merging
 from contourslam.joining.groups import LeftOut
 from contourslam.joining.joint import Apart, Evidence, Joint
 from contourslam.maps import SavedMap, load_map, save_map
@@ -133,7 +135,11 @@ def test_nothing_is_written_where_no_maps_are_joined(
 
 @pytest.mark.usefixtures("nothing_alike")
 def test_further_groups_stand_beside_the_largest(
-    runs: tuple[Path, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], failure: Failure
+    runs: tuple[Path, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    failure: Failure,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     copies = []
     for n, path in enumerate((runs[2], runs[2], runs[0])):
@@ -156,7 +162,48 @@ def test_further_groups_stand_beside_the_largest(
         assert other is not None
         np.testing.assert_array_equal(one.poses, other.poses)  # a map merged with itself is that map
     house.unlink()
-    assert "house-2.cmap is there already" in failure(*words(runs[0], runs[2], *copies, "-o", house))
+    with monkeypatch.context() as patch:  # before anything is compared
+        patch.setattr(find, "find_joint", None)
+        assert "house-2.cmap is there already" in failure(*words(runs[0], runs[2], *copies, "-o", house))
+
+    own = tmp_path / "house-4.cmap"  # somebody's own map stays, whatever its name
+    for path, map_file in ((tmp_path / "house-3.cmap", tmp_path / "house-2.cmap"), (own, copies[0])):
+        shutil.copy(map_file, path)
+    assert main(words(runs[2], copies[0], "-o", house, "--overwrite")) == 0
+    assert sorted(path.name for path in tmp_path.glob("house*")) == ["house-4.cmap", "house.cmap"]
+
+
+@pytest.mark.usefixtures("nothing_alike")
+def test_ctrl_c_keeps_the_groups_that_are_solved_and_says_which(
+    runs: tuple[Path, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copies, solve, solved = [], merging.merge_group, []
+    for n, path in enumerate((runs[0], runs[2])):
+        copies.append(tmp_path / f"copy{n}.cmap")
+        shutil.copy(path / "map.cmap", copies[-1])
+
+    def stopped(*arguments: Any) -> merging.Merged:
+        if solved:
+            raise KeyboardInterrupt
+        solved.append(arguments)
+        return solve(*arguments)
+
+    monkeypatch.setattr(merging, "merge_group", stopped)
+    house = tmp_path / "house.cmap"
+    assert main(words(runs[0], runs[2], *copies, "-o", house)) == INTERRUPTED
+    assert f"interrupted; what was solved until then is in {house}" in capsys.readouterr().err
+    assert load_map(house).keyframes is not None
+    assert not (tmp_path / "house-2.cmap").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_of_before_anything_is_compared(
+    runs: tuple[Path, ...], tmp_path: Path, failure: Failure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(find, "find_joint", None)
+    (tmp_path / "file").touch()
+    assert "cannot be made" in failure(*words(*runs, "-o", tmp_path / "file" / "house.cmap"))
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert "cannot be written" in failure(*words(*runs, "-o", tmp_path / "house.cmap"))
 
 
 @pytest.mark.usefixtures("nothing_alike")

@@ -1,17 +1,20 @@
 """``contourslam merge``: several maps to one, where they overlap."""
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from contourslam.cli.console import Bar, make_way, note, prepare_folder, print_json
+from contourslam.atomic import make_folder, remove
+from contourslam.cli.console import Bar, complain, make_way, note, prepare_folder, print_json
+from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.cli.locate import UNSURE
 from contourslam.cli.options import Json, Overwrite
-from contourslam.errors import ConfigError, MapError
+from contourslam.errors import ConfigError, MapError, ResultError
 
 if TYPE_CHECKING:
     from contourslam.joining.groups import LeftOut
@@ -35,6 +38,7 @@ class Merge:
 
     Where some maps stay apart, the largest group becomes the map, further groups stand beside it with -2, -3 in their
     names, maps that join no other stay as they are, and the exit code is 3. Nothing is written where none are joined.
+    Each group is written as soon as it is solved, and Ctrl-C keeps it.
 
     Example: contourslam merge out/monday out/tuesday -o house.cmap --picture house.svg
     """
@@ -55,11 +59,23 @@ class Merge:
         paths = [path / _MAP if path.is_dir() else path for path in self.maps]
         names = self._checked(paths)
         maps = [_load(path) for path in paths]
-        found = _verdicts(maps, names)
-        groups = _merged(maps, found)
-        for number in range(1, len(groups)):
-            self._make_way(number)
-        told = [self._write(group, number, names, paths, maps) for number, group in enumerate(groups)]
+        groups: list[Merged] = []
+        told: list[dict[str, Any]] = []
+
+        def keep(group: "Merged") -> None:
+            told.append(self._write(group, len(groups), names, paths, maps))
+            groups.append(group)
+
+        try:
+            found = _verdicts(maps, names)
+            _merge(maps, found, keep)
+        except KeyboardInterrupt:
+            if not told:
+                raise
+            complain(f"interrupted; what was solved until then is in {', '.join(one['file'] for one in told)}")
+            return INTERRUPTED
+        if groups:
+            self._remove_more(len(groups), paths)
         alone = [name for n, name in enumerate(names) if not any(n in group.members for group in groups)]
         left_out = {left.maps: left for group in groups for left in group.left_out}
         pairs = [Verdict((names[a], names[b]), found[a, b], left_out.get((a, b))) for a, b in found]
@@ -76,19 +92,38 @@ class Merge:
         if len(paths) < 2:
             raise ConfigError("a map is merged with others: name two or more")
         names = distinct_names([path.parent if path.name == _MAP else path.with_suffix("") for path in paths])
-        if self.output.resolve() in [path.resolve() for path in paths]:
-            raise ConfigError(f"{self.output} is one of the maps itself; choose another file with --output")
         if self.picture is not None and self.picture.suffix != ".svg":
             raise ConfigError(f"{self.picture}: the picture is a .svg file")
-        self._make_way(0)
+        for number in range(len(paths) // 2):  # as many groups as there may be
+            for path in self._files(number):
+                if path.resolve() in [each.resolve() for each in paths]:
+                    raise ConfigError(f"{path} is one of the maps itself; choose another file with --output")
+                make_way(path, overwrite=self.overwrite)
+                make_folder(path.parent)
+                if not os.access(path.parent, os.W_OK):
+                    raise ResultError(f"{path.parent}: cannot be written; choose another folder")
         if self.trajectories is not None:
             prepare_folder(self.trajectories, overwrite=self.overwrite)
         return names
 
-    def _make_way(self, number: int) -> None:
-        make_way(_numbered(self.output, number), overwrite=self.overwrite)
-        if self.picture is not None:
-            make_way(_numbered(self.picture, number), overwrite=self.overwrite)
+    def _files(self, number: int) -> list[Path]:
+        """Files of a group."""
+        return [_numbered(path, number) for path in (self.output, self.picture) if path is not None]
+
+    def _remove_more(self, number: int, paths: list[Path]) -> None:
+        """Remove the groups from this one on that an earlier merge left: they would not belong to this one."""
+        from contourslam.maps import load_map
+
+        inputs = [path.resolve() for path in paths]
+        while (file := _numbered(self.output, number)).is_file() and file.resolve() not in inputs:
+            try:
+                if "merged" not in load_map(file).about:
+                    return
+            except MapError:
+                return
+            for path in self._files(number):
+                remove(path)
+            number += 1
 
     def _write(
         self, group: "Merged", number: int, names: list[str], paths: list[Path], maps: "list[SavedMap]"
@@ -174,8 +209,8 @@ def _draw(bar: Bar, done: int, count: int) -> None:
     bar.to(done / count)
 
 
-def _merged(maps: "list[SavedMap]", found: "dict[Pair, Joint | Apart | int]") -> "list[Merged]":
-    """Merge; only what was made of several maps is given."""
+def _merge(maps: "list[SavedMap]", found: "dict[Pair, Joint | Apart | int]", keep: "Callable[[Merged], None]") -> None:
+    """Merge; `keep` gets what was made of several maps as soon as it is."""
     from contourslam.joining.joint import Joint
     from contourslam.joining.merging import merge_maps
 
@@ -187,8 +222,10 @@ def _merged(maps: "list[SavedMap]", found: "dict[Pair, Joint | Apart | int]") ->
             nonlocal done
             done += len(merged.members)
             bar.to(done / len(maps))
+            if len(merged.members) > 1:
+                keep(merged)
 
-        return [merged for merged in merge_maps(maps, joints, observer=made) if len(merged.members) > 1]
+        merge_maps(maps, joints, observer=made)
 
 
 def _carry(path: Path, old: "SavedMap", new: "SavedMap", keys: Any, target: Path) -> str | None:
