@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from contourslam.experiments.sweep.extras import require
+from contourslam.evaluation.extras import require
 from contourslam.experiments.sweep.store import Store, read_results
 from table import Table, publish
 
@@ -89,7 +89,7 @@ class Cluster:
 
     def kill_a_worker(self, chance: random.Random) -> None:
         """Kill one of the workers that are connected."""
-        with require("distributed").Client(self.address, set_as_default=False) as client:
+        with require("distributed", "sweep").Client(self.address, set_as_default=False) as client:
             os.kill(chance.choice(sorted(client.run(os.getpid).values())), 9)
 
     def close(self) -> None:

@@ -106,3 +106,27 @@ def test_what_is_wrong_in_the_file_is_one_line(sweep):
     assert complaint == (
         "contourslam: error: experiment.toml, line 6: simulation.beems: is unknown; did you mean beams?\n"
     )
+
+
+def test_another_sweep_that_writes_its_experiment_meanwhile_changes_no_word_of_this_one(sweep, monkeypatch):
+    here = engine.sweep
+
+    def meanwhile(runs, store, **options):
+        store.write_experiment("small", "", ["another"])
+        return here(runs, store, **options)
+
+    monkeypatch.setattr(engine, "sweep", meanwhile)
+    code, said, complaint = sweep(TEXT, "--json")
+    assert (code, said["runs"], said["done"]) == (0, 1, 1), complaint
+
+
+def test_a_damaged_row_is_told_and_done_again(sweep):
+    sweep(TEXT)
+    (table,) = Path("results/tables").iterdir()
+    table.unlink()
+    Path("results/results.parquet").unlink()
+    (key,) = Store("results").planned().keys
+    Path(f"results/parts/{key}.done.parquet").write_bytes(b"PAR1 x")
+    code, said, complaint = sweep(TEXT, "--json")
+    assert (code, said["done"], said["now"]) == (0, 1, 1)
+    assert f"{key}.done.parquet is damaged; its run counts as not done" in complaint

@@ -61,6 +61,8 @@ class Sweep:
         runs = plan(experiment)
         store = Store(self.output)
         there = store.status()
+        for name in store.damaged[:_SHOWN]:
+            note(f"{store.url}/{name} is damaged; its run counts as not done")
         over = (DONE,) if self.retry_failed else (DONE, FAILED)
         todo = [run for run in runs if there.get(run.key) not in over]
         counts = {
@@ -106,11 +108,11 @@ class Sweep:
     def _report(self, runs: "Sequence[Run]", store: "Store", outcome: "Outcome") -> int:
         """Say what there is now, and what failed."""
         from contourslam.experiments.sweep.rows import DONE, FAILED
-        from contourslam.experiments.sweep.store import read_results
 
         if outcome.complete:
             store.compact()
-        table = read_results(self.output).select(["status", "key", "error_type", "error"]).to_pylist()
+        # Its own runs: another sweep may have written a further experiment meanwhile.
+        table = store.rows([run.key for run in runs]).select(["status", "key", "error_type", "error"]).to_pylist()
         failed: dict[str, Any] = {row["key"]: row for row in table if row["status"] == FAILED}
         done = sum(row["status"] == DONE for row in table)
         names = {run.key: run.name for run in runs}

@@ -6,13 +6,15 @@ from typing import Any
 from contourslam.errors import MissingExtraError
 
 
-def require(module: str) -> Any:
-    """Import a module of the `report` extra.
+def require(module: str, extra: str = "report") -> Any:
+    """Import a module of an extra.
 
     Parameters
     ----------
     module : str
         Dotted name of the module.
+    extra : str
+        The package's extra that installs it.
 
     Raises
     ------
@@ -24,5 +26,5 @@ def require(module: str) -> Any:
     except ModuleNotFoundError as error:
         library = module.partition(".")[0]
         raise MissingExtraError(
-            f"{library} is needed for this measure and is not installed: pip install 'contourslam[report]'"
+            f"{library} is needed for this and is not installed: pip install 'contourslam[{extra}]'"
         ) from error

@@ -21,6 +21,12 @@ ROOM = '[simulation]\nrooms = ["furnished_room"]\n'
         (ROOM + "noise = true\n", "line 4: simulation.noise: must be a number"),
         (ROOM + "noise = [nan]\n", "line 4: simulation.noise: must be a number"),
         (ROOM + "seeds = 0\n", "line 4: simulation.seeds: must be how many"),
+        (ROOM + "seeds = []\n", "line 4: simulation.seeds: is empty"),
+        (ROOM + "seeds = 100000000\n", "line 4: simulation.seeds: are more than 1000000 runs, got 100000000"),
+        (
+            'detectors = "wu"\n' + ROOM + "seeds = 1000000\nnoise = [0.0, 0.1]\n",
+            "makes 2000000 runs, more than 1000000",
+        ),
         (ROOM + "speed = []\n", "line 4: simulation.speed: is empty"),
         (
             ROOM + "[settings.a]\nslam.wals = true\n",

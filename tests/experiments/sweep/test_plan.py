@@ -7,7 +7,9 @@ import pytest
 
 from contourslam.errors import ConfigError
 from contourslam.experiments.sweep import runs as runs_module
+from contourslam.experiments.sweep import versions
 from contourslam.experiments.sweep.plan import plan
+from contourslam.experiments.sweep.tasks import other_program
 
 SMALL = 'detectors = ["wu"]\n[simulation]\nrooms = "furnished_room"\n'
 
@@ -141,3 +143,19 @@ def test_planning_runs_nothing_of_a_detectors_file(planned, tmp_path):
     before = keys(planned(text))
     (tmp_path / "mine.py").write_text("raise SystemExit\nMine = None  # changed\n")
     assert not keys(planned(text)) & before
+
+
+def test_another_factory_of_the_same_file_makes_another_key(planned, tmp_path):
+    (tmp_path / "mine.py").write_text("from contourslam.detectors import TehChin as B, Wu as A\n")
+    text = SMALL.replace('["wu"]', '"mine"') + '[own_detectors]\nmine = "mine.py:A"\n'
+    assert not keys(planned(text)) & keys(planned(text.replace("mine.py:A", "mine.py:B")))
+
+
+def test_other_libraries_make_another_key(planned, monkeypatch):
+    plain = versions.program()
+    found = versions.libraries() | {"mujoco": "0.0.1"}
+    monkeypatch.setattr(versions, "libraries", lambda: found)
+    other = versions.program.__wrapped__()
+    assert other.rpartition(".")[0] == plain.rpartition(".")[0]
+    assert other != plain
+    assert "has other libraries (of numpy," in other_program("tcp://a:1", other, plain)

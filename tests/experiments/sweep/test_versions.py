@@ -21,8 +21,8 @@ def test_what_no_run_uses_is_not_in_its_version():
     ]
 
 
-def test_the_version_names_the_package_and_its_source():
-    version, _, digest = program().partition("+")
+def test_the_version_names_the_package_its_source_and_the_libraries():
+    version, _, digests = program().partition("+")
     assert version.count(".") == 2
-    assert len(digest) == 12
+    assert list(map(len, digests.split("."))) == [12, 8]
     assert libraries()["numpy"] != "not installed"

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from contourslam.errors import ConfigError
+from contourslam.detectors import TehChin, Wu
+from contourslam.errors import ConfigError, RecordingError
 from contourslam.experiments.compare import compare
 from contourslam.experiments.replays import Variant
+from contourslam.experiments.sweep.own_detector import load_detector
 from contourslam.experiments.sweep.work import measure
 from contourslam.simulation.config import SimulationConfig
 from contourslam.simulation.rooms import ROOMS
@@ -77,10 +79,27 @@ def test_a_detector_of_ones_own_is_made_with_adapted_and_used(planned, tmp_path)
 
 def test_a_detector_may_come_from_a_module_that_is_the_same_everywhere(planned, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "sweep_test_module.py").write_text("from contourslam.detectors import Wu as Mine\n")
-    text = 'detectors = "mine"\n[own_detectors]\nmine = "sweep_test_module:Mine"\n' + ROOM
+    (tmp_path / "sweep_test_package").mkdir()
+    module = tmp_path / "sweep_test_package" / "mine.py"
+    (tmp_path / "sweep_test_package" / "__init__.py").touch()
+    (tmp_path / "sweep_test_package" / "beside.py").write_text("from contourslam.detectors import TehChin, Wu\n")
+    module.write_text("from .beside import Wu as Mine\n")
+    text = 'detectors = "mine"\n[own_detectors]\nmine = "sweep_test_package.mine:Mine"\n' + ROOM
     (run,) = planned(text)
-    assert measure(run)["scans"] > 10
-    (tmp_path / "sweep_test_module.py").write_text("from contourslam.detectors import TehChin as Mine\n")
+    assert isinstance(load_detector(run.own, adapted=False), Wu)
+    module.write_text("from .beside import TehChin as Mine\n")
     with pytest.raises(ConfigError, match="is not the same as where the sweep was started"):
+        measure(run)
+    # A worker that has run the old one does not take it for the new one.
+    (run,) = planned(text)
+    assert isinstance(load_detector(run.own, adapted=False), TehChin)
+
+
+@pytest.mark.parametrize("planned_with", ["nothing", "another"])
+def test_a_recording_that_is_another_on_the_worker_is_refused(planned, tmp_path, log_of, planned_with):
+    if planned_with == "another":
+        (tmp_path / "still.log").write_text("another")
+    (run,) = planned('detectors = "wu"\n[recordings]\npaths = "still.log"\n')
+    log_of()
+    with pytest.raises(RecordingError, match="is not here what it was where the sweep was started"):
         measure(run)

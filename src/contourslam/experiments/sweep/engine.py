@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from contourslam.errors import ConfigError, ContourslamError
+from contourslam.evaluation.extras import require
 from contourslam.experiments.parallel import Observer
-from contourslam.experiments.sweep.extras import require
 from contourslam.experiments.sweep.rows import DONE, FAILED
 from contourslam.experiments.sweep.runs import Run
 from contourslam.experiments.sweep.store import Store
@@ -143,7 +143,7 @@ class _Session:
         status = future.status
         if status == "error":
             error = future.exception()
-            if not isinstance(error, require("distributed").KilledWorker):
+            if not isinstance(error, require("distributed", "sweep").KilledWorker):
                 raise error
         elif status != "finished":
             raise ContourslamError(_LOST)
@@ -167,7 +167,7 @@ def _cores() -> int:
 @contextlib.contextmanager
 def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
     """Connect to a scheduler, or start one with workers in processes of this machine that nobody else can reach."""
-    distributed = require("distributed")
+    distributed = require("distributed", "sweep")
     for name in ("distributed", "distributed.client", "distributed.core", "distributed.comm"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what ends a sweep, it says itself
     if scheduler is not None:
@@ -183,7 +183,7 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
             _close(client)
         return
     # A nanny starts a worker that died again, and again; the cluster must not give it up meanwhile.
-    require("dask").config.set({"distributed.deploy.lost-worker-timeout": "1 day"})
+    require("dask", "sweep").config.set({"distributed.deploy.lost-worker-timeout": "1 day"})
     cluster = distributed.LocalCluster(
         n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL, env=_ONE_THREAD, preload=_PRELOAD,

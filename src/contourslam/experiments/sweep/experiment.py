@@ -17,8 +17,11 @@ from contourslam.simulation.config import LIDARS
 from contourslam.simulation.rooms import ROOMS
 
 _FILE = ("name", "detectors", "own_detectors", "simulation", "recordings", "settings", "sweep")
+_EMPTY = "is empty; leave it out, or name something"
 _SIMULATION = ("rooms", "noise", "beams", "seeds", "lidar", "duration", "speed")
 _RECORDINGS = ("paths", "relations")
+MOST_RUNS = 1_000_000
+"""More are a slip of the pen."""
 _PLAIN = {"default": {}}  # type: dict[str, dict[str, Any]]
 
 
@@ -161,7 +164,17 @@ def _experiment(content: dict[str, Any], text: str, folder: Path) -> Experiment:
     grids = tuple(read.grid(base, block, "sweep") for block in blocks)
     if not any(grid.rooms or grid.recordings for grid in grids):
         raise _WrongError("", "", "there is nothing to run on: add [simulation] with rooms, or [recordings] with paths")
+    if (count := sum(map(_count, grids))) > MOST_RUNS:
+        raise _WrongError(
+            "", "", f"makes {count} runs, more than {MOST_RUNS}; take some of the axes apart with [[sweep]]"
+        )
     return Experiment(name, text, folder, grids, settings, own, relations)
+
+
+def _count(grid: Grid) -> int:
+    """How many runs a grid makes, each pattern of recordings taken for one."""
+    axes = (grid.rooms, grid.noise, grid.beams, grid.seeds, grid.lidar, grid.duration, grid.speed)
+    return (math.prod(map(len, axes)) + len(grid.recordings)) * len(grid.detectors) * len(grid.settings)
 
 
 def _known(table: Mapping[str, Any], names: tuple[str, ...], place: str) -> None:
@@ -255,7 +268,11 @@ def _numbers(
 
 def _seeds(place: str, key: str, value: Any) -> tuple[int, ...]:
     """So many seeds from 0 on, or a list of them."""
+    if type(value) is int and value > MOST_RUNS:
+        raise _WrongError(place, key, f"are more than {MOST_RUNS} runs, got {value}")
     seeds = list(range(value)) if type(value) is int and value > 0 else value
+    if seeds == []:
+        raise _WrongError(place, key, _EMPTY)
     if not isinstance(seeds, list) or not all(type(seed) is int and seed >= 0 for seed in seeds):
         raise _WrongError(
             place, key, f"must be how many (seeds 0, 1, 2, ...) or a list of whole numbers, got {value!r}"
@@ -266,7 +283,7 @@ def _seeds(place: str, key: str, value: Any) -> tuple[int, ...]:
 def _listed(place: str, key: str, value: Any) -> list[Any]:
     values = value if isinstance(value, list) else [value]
     if not values and key not in ("rooms", "recordings", "paths"):
-        raise _WrongError(place, key, "is empty; leave it out, or name something")
+        raise _WrongError(place, key, _EMPTY)
     return list(dict.fromkeys(values)) if all(isinstance(each, str | int | float) for each in values) else values
 
 

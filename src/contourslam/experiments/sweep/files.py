@@ -8,8 +8,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from contourslam.errors import ConfigError, MissingExtraError, RecordingError
-from contourslam.experiments.sweep.extras import require
+from contourslam.evaluation.extras import require
 
+UNREADABLE = "cannot be read"
+"""With this begins the identity of what is not there."""
 _BLOCK = 1 << 20  # bytes
 
 
@@ -27,7 +29,7 @@ def open_place(url: str) -> tuple[Any, str]:
     MissingExtraError
         If the library for it is not installed.
     """
-    fsspec = require("fsspec")
+    fsspec = require("fsspec", "sweep")
     try:
         system, path = fsspec.core.url_to_fs(url)
     except ImportError as error:
@@ -109,7 +111,7 @@ def identity(url: str) -> str:
                     digest.update(block)
                     size += len(block)
     except OSError:
-        return f"cannot be read: {url}"
+        return f"{UNREADABLE}: {url}"
     return f"{size} bytes {digest.hexdigest()}"
 
 

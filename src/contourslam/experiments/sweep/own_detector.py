@@ -41,6 +41,11 @@ class OwnDetector:
     digest: str
     source: bytes | None = field(default=None, repr=False)
 
+    @property
+    def factory(self) -> str:
+        """What of the file makes the detector."""
+        return self.place.rpartition(":")[2]
+
 
 def find_detector(name: str, place: str, folder: Path) -> OwnDetector:
     """Look at a detector's file without running it.
@@ -98,26 +103,28 @@ def load_detector(detector: OwnDetector, *, adapted: bool) -> Detector:
     Exception
         Whatever the file raises.
     """
-    where, _, factory = detector.place.rpartition(":")
-    if detector.source is None:
+    where = detector.place.rpartition(":")[0]
+    title, source = f"contourslam_own_{detector.digest[:16]}", detector.source
+    if source is None:
         path = _module_file(where)
-        if hashlib.sha256(path.read_bytes()).hexdigest() != detector.digest:
+        source = path.read_bytes()
+        if hashlib.sha256(source).hexdigest() != detector.digest:
             raise ConfigError(f"{path} is not the same as where the sweep was started; install the same on all workers")
-        module = importlib.import_module(where)
-    else:
-        title = f"contourslam_own_{detector.digest[:16]}"
-        if title not in sys.modules:
-            loader = _Shipped(where, detector.source)
-            spec = importlib.machinery.ModuleSpec(title, loader, origin=where)
-            module = importlib.util.module_from_spec(spec)
-            sys.modules[title] = module  # dataclasses look their module up there
-            try:
-                loader.exec_module(module)
-            except BaseException:
-                del sys.modules[title]
-                raise
-        module = sys.modules[title]
-    return cast(Factory, getattr(module, factory))(adapted)
+        # Not imported under its own name: a worker that lives long may have an older one under that.
+        package = where if path.name == "__init__.py" else where.rpartition(".")[0]
+        if package:
+            importlib.import_module(package)
+            title = f"{package}.{title}"
+    if title not in sys.modules:
+        loader = _Shipped(where, source)
+        module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(title, loader, origin=where))
+        sys.modules[title] = module  # dataclasses look their module up there
+        try:
+            loader.exec_module(module)
+        except BaseException:
+            del sys.modules[title]
+            raise
+    return cast(Factory, getattr(sys.modules[title], detector.factory))(adapted)
 
 
 class _Shipped(importlib.abc.SourceLoader):

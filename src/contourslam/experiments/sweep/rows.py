@@ -38,8 +38,8 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
+from contourslam.evaluation.extras import require
 from contourslam.evaluation.metrics import Metrics
-from contourslam.experiments.sweep.extras import require
 from contourslam.experiments.sweep.runs import Run
 from contourslam.experiments.sweep.versions import libraries, program
 
@@ -99,7 +99,7 @@ def failed_row(run: Run, error: BaseException, *, started: datetime, seconds: fl
 
 def table_of(rows: Sequence[Row]) -> Any:
     """Rows as a ``pyarrow.Table``: the fixed columns, then the figures in alphabetical order."""
-    pa = require("pyarrow")
+    pa = require("pyarrow", "sweep")
     figures = sorted({name for row in rows for name in row} - set(FIXED))
     kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64(), "time": pa.timestamp("us", tz="UTC")}
     fixed = [(name, kinds[kind]) for name, kind in FIXED.items()]

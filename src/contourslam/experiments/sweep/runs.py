@@ -133,7 +133,7 @@ class Run:
         """Name of the run's row: 32 hexadecimal digits, the same for the same configuration and program only."""
         known = self.description | {"program": program()}
         if self.own is not None:  # where the file lies does not matter
-            known["own_detector"] = self.own.digest
+            known["own_detector"] = [self.own.digest, self.own.factory]
         if isinstance(self.drive, RecordedDrive):  # nor where the recording does
             known["drive"] = [self.drive.identity, self.drive.relations_identity]
         return hashlib.sha256(json.dumps(known, sort_keys=True, allow_nan=False).encode()).hexdigest()[:32]

@@ -1,28 +1,50 @@
-"""Where the rows are kept: on any file system that fsspec knows, one small file a run, and one table in the end.
+"""Where the rows are kept: on any file system that fsspec knows, one small file a run, brought into tables later.
 
 Below the results' place::
 
     experiment.json      the experiment, as it was read, and the keys of its runs
     starts/SESSION/KEY/  a mark for each time that a run was begun
     parts/KEY.done.parquet, parts/KEY.failed.parquet    one row each, written as soon as the run is over
-    results.parquet      the rows together
+    tables/ID.parquet    rows together; never changed, and removed only once another table holds all that is in it
+    results.parquet      all rows, a copy for other tools
 
-A run that is done twice by accident is written to the same place twice, so every row is there once.
+Whoever reads takes the union, each run once. So several sweeps may write to one place, and crash, and no row is lost.
 """
 
 import json
-from collections.abc import Iterable
+import secrets
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
-from contourslam.atomic import write_bytes
-from contourslam.errors import ContourslamError, ResultError
-from contourslam.experiments.sweep.extras import require
-from contourslam.experiments.sweep.files import is_local, open_place
+from contourslam.errors import ResultError
+from contourslam.evaluation.extras import require
+from contourslam.experiments.sweep.place import Place
 from contourslam.experiments.sweep.rows import DONE, FAILED, Row, table_of
 
 _AT_ONCE = 16  # files read side by side: elsewhere, each is a wait
+_READINGS = 20  # until files keep still that another sweep brings together
+_COPY = "results.parquet"
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What ``experiment.json`` says.
+
+    Attributes
+    ----------
+    name : str
+        Of the experiment.
+    text : str
+        The experiment file.
+    keys : tuple of str
+        Of its runs.
+    """
+
+    name: str
+    text: str
+    keys: tuple[str, ...]
 
 
 class Store:
@@ -33,6 +55,11 @@ class Store:
     url : str
         Path or URL of a folder; made where needed.
 
+    Attributes
+    ----------
+    damaged : tuple of str
+        Files of one row each that the last reading found damaged and left out: their runs count as not done.
+
     Raises
     ------
     ConfigError, MissingExtraError
@@ -40,10 +67,31 @@ class Store:
     """
 
     def __init__(self, url: str) -> None:
-        self.url = url if "://" in url else str(Path(url).resolve())
-        self._system, self._root = open_place(self.url)
+        self._place = Place(url)
+        self.url = self._place.url
+        self.damaged: tuple[str, ...] = ()
+        self._known: dict[str, dict[str, str]] = {}
 
-    def write_experiment(self, name: str, text: str, keys: list[str]) -> None:
+    def planned(self) -> Planned | None:
+        """The experiment as it was last read; None where there is none.
+
+        Raises
+        ------
+        ResultError
+            If the place is no folder, or its ``experiment.json`` is none of a sweep.
+        """
+        there = self._place.read("experiment.json")
+        if there is None:
+            return None
+        try:
+            said = json.loads(there)
+            return Planned(str(said["name"]), str(said["text"]), tuple(map(str, said["keys"])))
+        except (ValueError, KeyError, TypeError) as error:
+            raise ResultError(
+                f"{self.url}/experiment.json: is none of a sweep ({error!r}); remove it, or choose another folder"
+            ) from error
+
+    def write_experiment(self, name: str, text: str, keys: Sequence[str]) -> None:
         """Note which experiment this is and which runs belong to it.
 
         Raises
@@ -51,32 +99,29 @@ class Store:
         ResultError
             If the results are another experiment's, or cannot be written.
         """
-        there = self._read("experiment.json")
-        if there is not None:
-            other = json.loads(there).get("name")
-            if other != name:
-                raise ResultError(f"{self.url} holds the results of {other!r}, not of {name!r}; choose another folder")
-        self._write("experiment.json", json.dumps({"name": name, "text": text, "keys": keys}).encode())
-
-    def keys(self) -> list[str] | None:
-        """Keys of the runs that belong to the experiment as it was last read; None where there is none."""
-        there = self._read("experiment.json")
-        return None if there is None else list(json.loads(there)["keys"])
+        there = self.planned()
+        if there is not None and there.name != name:
+            raise ResultError(f"{self.url} holds the results of {there.name!r}, not of {name!r}; choose another folder")
+        self._place.write("experiment.json", json.dumps({"name": name, "text": text, "keys": list(keys)}).encode())
 
     def begin(self, session: str, key: str) -> int:
         """Mark that a run is begun, and tell how often it has been in this session, this time included."""
         folder = f"starts/{session}/{key}"
-        tries = len(self._names(folder)) + 1
-        self._write(f"{folder}/{tries}", b"")
+        tries = len(self._place.names(folder)) + 1
+        self._place.write(f"{folder}/{tries}", b"")
         return tries
 
     def starts(self) -> dict[str, int]:
         """How often each run was begun, by its key, in all sessions since the marks were last removed."""
         counts: dict[str, int] = {}
-        for path in self._system.find(f"{self._root}/starts"):
-            key = str(path).split("/")[-2]
+        for path in self._place.below("starts"):
+            key = path.split("/")[-2]
             counts[key] = counts.get(key, 0) + 1
         return counts
+
+    def remove_starts(self) -> None:
+        """Remove the marks of runs begun."""
+        self._place.remove_folder("starts")
 
     def write_row(self, row: Row) -> None:
         """Keep a row, whole or not at all; one that was done stands above one that failed.
@@ -86,58 +131,65 @@ class Store:
         ResultError
             If it cannot be written.
         """
-        pa, parquet = require("pyarrow"), require("pyarrow.parquet")
-        sink = pa.BufferOutputStream()
-        parquet.write_table(table_of([row]), sink)
-        self._write(_part(row["key"], row["status"]), sink.getvalue().to_pybytes())
+        self._write_table(_part(row["key"], row["status"]), table_of([row]))
         if row["status"] == DONE:
-            self._remove(_part(row["key"], FAILED))
+            self._place.remove(_part(row["key"], FAILED))
 
     def status_of(self, key: str) -> str | None:
-        """``done`` or ``failed`` where the run has a row of its own; None where it has not."""
-        there = (status for status in (DONE, FAILED) if self._system.exists(f"{self._root}/{_part(key, status)}"))
-        return next(there, None)
+        """``done`` or ``failed`` of a run that has a row of its own, ``done`` of one that is in a table; else None.
+
+        What failed in a table is no answer: it may be there since before it was to be done again.
+        """
+        for status in (DONE, FAILED):
+            if self._place.exists(_part(key, status)):
+                return status
+        for name in self._tables():
+            if name not in self._known and (content := self._place.read(name)) is not None:
+                self._known[name] = _statuses(_parsed(content, ["key", "status"]))
+            if self._known.get(name, {}).get(key) == DONE:
+                return DONE
+        return None
 
     def forget_failed(self, keys: Iterable[str]) -> None:
-        """Remove rows of runs that failed and are to be done again."""
-        failed = {key for key, status in self._parts() if status == FAILED}
-        for key in failed & set(keys):
-            self._remove(_part(key, FAILED))
+        """Remove rows of runs that failed and are to be done again, and what was found damaged of them."""
+        wanted = set(keys)
+        failed = {_part(key, status) for key, status in self._parts() if status == FAILED and key in wanted}
+        for name in failed | {name for name in self.damaged if name.split("/")[1].partition(".")[0] in wanted}:
+            self._place.remove(name)
 
     def status(self) -> dict[str, str]:
-        """``done`` or ``failed`` of every run that has a row, by its key; cheap."""
-        table = self._table(["key", "status"])
-        found = {} if table is None else dict(zip(*(table.column(i).to_pylist() for i in range(2)), strict=True))
-        for key, status in self._parts():
-            if found.get(key) != DONE:
-                found[key] = status
-        return found
-
-    def read(self) -> Any:
-        """Every row, of earlier programs and experiments too, once: a ``pyarrow.Table``.
+        """``done`` or ``failed`` of every run that has a row, by its key.
 
         Raises
         ------
         ResultError
-            If a file cannot be read.
+            As :meth:`read`.
         """
-        pa = require("pyarrow")
-        table = self._table()
-        there = set() if table is None else set(table.column("key").to_pylist())
-        done = set() if table is None else {k for k, s in _statuses(table) if s == DONE}
-        parts = [part for part in self._parts() if part[0] not in done]
-        parts = [part for part in parts if part[1] == DONE or (part[0], DONE) not in parts]
-        with ThreadPoolExecutor(_AT_ONCE) as pool:
-            rows = list(pool.map(lambda part: self._parquet(_part(*part)), parts))
-        newer = {key for key, _ in parts}
-        if table is not None and there & newer:
-            kept = [key not in newer for key in table.column("key").to_pylist()]
-            table = table.filter(pa.array(kept))
-        tables = [each for each in (table, *rows) if each is not None]
-        return pa.concat_tables(tables, promote_options="default") if tables else table_of([])
+        found: dict[str, str] = {}
+        for table in self._files(["key", "status"]).values():
+            found |= {key: status for key, status in _statuses(table).items() if found.get(key) != DONE}
+        return found
+
+    def read(self) -> Any:
+        """Every row, of earlier programs and experiments too, each run once: a ``pyarrow.Table``.
+
+        Of several rows of a run, one that was done stands above one that failed, and the later above the earlier.
+
+        Raises
+        ------
+        ResultError
+            If a table cannot be read. A row's own file that is damaged is left out, and is then in `damaged`.
+        """
+        return _once(self._files().values())
+
+    def rows(self, keys: Iterable[str]) -> Any:
+        """Rows of some runs, those that are there, in their order: a ``pyarrow.Table``."""
+        table = self.read()
+        place = {key: row for row, key in enumerate(table.column("key").to_pylist())}
+        return table.take(_pa().array([place[key] for key in keys if key in place], "int64"))
 
     def compact(self) -> int:
-        """Bring all rows into ``results.parquet``, then remove the files that they came from.
+        """Bring all rows into one table and into ``results.parquet``, then remove the files that they came from.
 
         Returns
         -------
@@ -149,71 +201,54 @@ class Store:
         ResultError
             If a file cannot be read or written.
         """
-        pa, parquet = require("pyarrow"), require("pyarrow.parquet")
-        parts = self._parts()
+        found = self._files()
+        if len(found) == 1 and next(iter(found)).startswith("tables/") and self._place.exists(_COPY):
+            return int(_once(found.values()).num_rows)
+        self._write_table(f"tables/{secrets.token_hex(16)}.parquet", _once(found.values()))
+        # Only what was read is removed: what came meanwhile stays, the table of another who does the same too.
+        for name in found:
+            if name != _COPY:
+                self._place.remove(name)
         table = self.read()
-        if parts or self._table(["key"]) is None:
-            sink = pa.BufferOutputStream()
-            parquet.write_table(table, sink)
-            self._write("results.parquet", sink.getvalue().to_pybytes())
-            for part in parts:
-                self._remove(_part(*part))
+        self._write_table(_COPY, table)
         return int(table.num_rows)
 
-    def remove_starts(self) -> None:
-        """Remove the marks of runs begun."""
-        if self._system.exists(f"{self._root}/starts"):
-            self._system.rm(f"{self._root}/starts", recursive=True)
+    def _files(self, columns: list[str] | None = None) -> dict[str, Any]:
+        """Content of all files of rows by their names, tables first; read anew where another sweep removed one."""
+        for _ in range(_READINGS):
+            # Parts are listed before tables: one that is gone by then is in a table that is listed.
+            parts = [_part(*part) for part in self._parts()]
+            tables = self._tables() or ([_COPY] if self._place.exists(_COPY) else [])
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                contents = list(pool.map(self._place.read, tables + parts))
+            whole = [content for content in contents if content is not None]
+            if len(whole) < len(contents):
+                continue
+            damaged, found = [], {}
+            for name, content in zip(tables + parts, whole, strict=True):
+                try:
+                    found[name] = _parsed(content, columns)
+                except (OSError, ValueError, KeyError, _pa().ArrowException) as error:
+                    if name in tables:
+                        raise ResultError(
+                            f"{self.url}/{name}: cannot be read ({error}); remove it, and its runs are done again"
+                        ) from error
+                    damaged.append(name)
+            self.damaged = tuple(damaged)
+            return found
+        raise ResultError(f"{self.url}: others bring its rows together all the time; try again")
 
     def _parts(self) -> list[tuple[str, str]]:
-        names = [name.split(".") for name in self._names("parts") if name.endswith(".parquet")]
+        names = [name.split(".") for name in self._place.names("parts") if name.endswith(".parquet")]
         return [(name[0], name[1]) for name in names if len(name) == 3]
 
-    def _names(self, folder: str) -> list[str]:
-        self._system.invalidate_cache()
-        try:
-            found = self._system.ls(f"{self._root}/{folder}", detail=False)
-        except FileNotFoundError:
-            return []
-        return sorted(name for name in (str(path).rpartition("/")[2] for path in found) if not name.startswith("."))
+    def _tables(self) -> list[str]:
+        return [f"tables/{name}" for name in self._place.names("tables") if name.endswith(".parquet")]
 
-    def _table(self, columns: list[str] | None = None) -> Any:
-        self._system.invalidate_cache()
-        there = self._system.exists(f"{self._root}/results.parquet")
-        return self._parquet("results.parquet", columns) if there else None
-
-    def _parquet(self, name: str, columns: list[str] | None = None) -> Any:
-        parquet = require("pyarrow.parquet")
-        path = f"{self._root}/{name}"
-        try:
-            with self._system.open(path, "rb") as file:
-                return parquet.read_table(file, columns=columns)
-        except (OSError, ValueError, require("pyarrow").ArrowException) as error:
-            raise ResultError(f"{path}: cannot be read ({error}); remove it, and its runs are done again") from error
-
-    def _read(self, name: str) -> bytes | None:
-        try:
-            return bytes(self._system.cat_file(f"{self._root}/{name}"))
-        except FileNotFoundError:
-            return None
-
-    def _write(self, name: str, content: bytes) -> None:
-        path = f"{self._root}/{name}"
-        if is_local(self._system):
-            write_bytes(Path(path), content)
-            return
-        try:
-            self._system.pipe_file(path, content)  # object stores show an object once it is whole
-        except ContourslamError:
-            raise
-        except Exception as error:  # each store has errors of its own
-            raise ResultError(f"{self.url}: {name} cannot be written ({error})") from error
-
-    def _remove(self, name: str) -> None:
-        try:
-            self._system.rm_file(f"{self._root}/{name}")
-        except FileNotFoundError:
-            return
+    def _write_table(self, name: str, table: Any) -> None:
+        sink = _pa().BufferOutputStream()
+        require("pyarrow.parquet", "sweep").write_table(table, sink)
+        self._place.write(name, sink.getvalue().to_pybytes())
 
 
 def read_results(url: str, *, every: bool = False) -> Any:
@@ -230,29 +265,50 @@ def read_results(url: str, *, every: bool = False) -> Any:
     -------
     pyarrow.Table
         One row a run, in the order of the experiment, with the columns of
-        :mod:`contourslam.experiments.sweep.rows`.
+        :mod:`contourslam.experiments.sweep.rows`. What was found damaged is left out.
 
     Raises
     ------
     ResultError
-        If there are no results, or a file cannot be read.
+        If there are no results, or a table cannot be read.
     ConfigError, MissingExtraError
         If the kind of URL is unknown, or its library is not installed.
     """
     store = Store(url)
-    keys = store.keys()
-    if keys is None:
+    planned = store.planned()
+    if planned is None:
         raise ResultError(f"{url}: holds no results of a sweep; name the folder that `contourslam sweep -o` wrote")
-    table = store.read()
-    if every:
-        return table
-    place = {key: row for row, key in enumerate(table.column("key").to_pylist())}
-    return table.take(require("pyarrow").array([place[key] for key in keys if key in place], "int64"))
+    return store.read() if every else store.rows(planned.keys)
+
+
+def _pa() -> Any:
+    return require("pyarrow", "sweep")
 
 
 def _part(key: str, status: str) -> str:
     return f"parts/{key}.{status}.parquet"
 
 
-def _statuses(table: Any) -> list[tuple[str, str]]:
-    return list(zip(table.column("key").to_pylist(), table.column("status").to_pylist(), strict=True))
+def _parsed(content: bytes, columns: list[str] | None) -> Any:
+    table = require("pyarrow.parquet", "sweep").read_table(_pa().BufferReader(content), columns=columns)
+    if not {"key", "status"} <= set(table.column_names):
+        raise ValueError("it holds no rows of a sweep")
+    return table
+
+
+def _statuses(table: Any) -> dict[str, str]:
+    return dict(zip(table.column("key").to_pylist(), table.column("status").to_pylist(), strict=True))
+
+
+def _once(tables: Iterable[Any]) -> Any:
+    """One row a run: one that was done stands above one that failed, then what was started later."""
+    several = list(tables)
+    if not several:
+        return table_of([])
+    table = _pa().concat_tables(several, promote_options="default")
+    best: dict[str, tuple[bool, Any, int]] = {}
+    columns = (table.column(name).to_pylist() for name in ("key", "status", "started"))
+    for row, (key, status, started) in enumerate(zip(*columns, strict=True)):
+        if key not in best or best[key] < (status == DONE, started, row):
+            best[key] = (status == DONE, started, row)
+    return table.take(_pa().array([row for *_, row in best.values()], "int64"))

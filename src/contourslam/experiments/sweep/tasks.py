@@ -14,7 +14,7 @@ from contourslam.errors import ContourslamError
 from contourslam.experiments.sweep.rows import DONE, FAILED, done_row, failed_row
 from contourslam.experiments.sweep.runs import Run
 from contourslam.experiments.sweep.store import Store
-from contourslam.experiments.sweep.versions import program
+from contourslam.experiments.sweep.versions import LIBRARIES, program
 
 TRIES = 3
 """How often a run may end its worker before it counts as failed."""
@@ -74,12 +74,17 @@ def pieces(runs: Sequence[Run], processes: int) -> list[tuple[Run, ...]]:
     return cut
 
 
-def do_task(task: Task) -> None:
+def do_task(task: Task) -> list[tuple[str, str]]:
     """Do the runs of a task that are not done, one after the other.
 
     Parameters
     ----------
     task : Task
+
+    Returns
+    -------
+    list of (str, str)
+        Key and status of each that was done here.
 
     Raises
     ------
@@ -95,7 +100,7 @@ def do_task(task: Task) -> None:
     def tell(key: str, status: str) -> None:
         worker.log_event(TOPIC, {"session": task.session, "key": key, "status": status})
 
-    do_runs(task, tell)
+    return do_runs(task, tell)
 
 
 def do_runs(task: Task, tell: Callable[[str, str], None]) -> list[tuple[str, str]]:
@@ -135,7 +140,9 @@ def stop(session: str) -> None:
 
 def other_program(worker: str, its: str, ours: str) -> str:
     """Say that a worker runs another program than this one."""
-    return f"{worker} has contourslam {its} and the sweep was started with {ours}; install the same on both"
+    same = its.rpartition(".")[0] == ours.rpartition(".")[0]
+    what = f"other libraries (of {', '.join(LIBRARIES)})" if same else f"contourslam {its}"
+    return f"{worker} has {what} and the sweep was started with {ours}; install the same on both"
 
 
 def _do(run: Run, store: Store, session: str) -> str:

@@ -1,6 +1,7 @@
 """Which program a run was done by: a changed one does not take over the rows of the one before."""
 
 import hashlib
+import json
 import platform
 import re
 from functools import cache
@@ -15,16 +16,21 @@ _PACKAGE = Path(contourslam.__file__).parent
 _IMPORT = re.compile(
     r"^\s*(?:from\s+(contourslam[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+(contourslam[\w.]*))", re.M
 )
-_LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gtsam", "rosbags", "evo", "shapely")
+LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gtsam", "rosbags", "evo", "shapely")
+"""Those that the numbers depend on."""
 
 
 @cache
 def program() -> str:
-    """Version of the package with a digest of all its source files that a run uses, such as ``0.1.0+1f2e3d4c5b6a``."""
+    """Version of the package, with digests of its source files that a run uses and of the libraries' versions.
+
+    Such as ``0.1.0+1f2e3d4c5b6a.9a8b7c6d``.
+    """
     digest = hashlib.sha256()
     for name in sources():
         digest.update(name.encode() + b"\0" + _file(name).read_bytes() + b"\0")
-    return f"{contourslam.__version__}+{digest.hexdigest()[:12]}"
+    others = hashlib.sha256(json.dumps({name: libraries()[name] for name in LIBRARIES}).encode())
+    return f"{contourslam.__version__}+{digest.hexdigest()[:12]}.{others.hexdigest()[:8]}"
 
 
 def sources() -> tuple[str, ...]:
@@ -46,7 +52,7 @@ def sources() -> tuple[str, ...]:
 def libraries() -> dict[str, str]:
     """Versions of the libraries that the numbers depend on."""
     found = {"python": platform.python_version()}
-    for name in _LIBRARIES:
+    for name in LIBRARIES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:

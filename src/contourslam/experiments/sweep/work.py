@@ -13,7 +13,7 @@ from contourslam.errors import RecordingError
 from contourslam.evaluation.metrics import Metrics, run_metrics
 from contourslam.evaluation.relations import judge
 from contourslam.experiments.refinement import corner_score
-from contourslam.experiments.sweep.files import fetched
+from contourslam.experiments.sweep.files import UNREADABLE, fetched, identity, is_local, open_place
 from contourslam.experiments.sweep.own_detector import OwnDetector, load_detector
 from contourslam.experiments.sweep.runs import RecordedDrive, Run, SimulatedDrive
 from contourslam.recordings import open_recording, read_relations
@@ -103,8 +103,9 @@ def recorded(where: RecordedDrive) -> Material:
     Raises
     ------
     RecordingError
-        If either cannot be read.
+        If either cannot be read, or is not the one that was planned with.
     """
+    _check(where.url, where.identity)
     with fetched(where.url) as path:
         recording = open_recording(path)
         messages: list[Message] = []
@@ -116,9 +117,17 @@ def recorded(where: RecordedDrive) -> Material:
         mount = recording.lidar_mount
     relations = None
     if where.relations is not None:
+        _check(where.relations, str(where.relations_identity))
         with fetched(where.relations) as path:
             relations = read_relations(path)
     return Material(tuple(messages), mount, relations, damage=damage, skipped=dict(recording.skipped))
+
+
+def _check(url: str, planned: str) -> None:
+    """Refuse a file that is another here: its row would stand under a key that is not its own."""
+    local = is_local(open_place(url)[0])  # elsewhere, some stores say something else after each reading
+    if (local or planned.startswith(UNREADABLE)) and identity(url) != planned:
+        raise RecordingError(f"{url}: is not here what it was where the sweep was started; start the sweep again")
 
 
 @lru_cache(maxsize=1)
