@@ -76,6 +76,6 @@ def test_parts_of_a_log_hold_its_messages_once(made: Mapped) -> None:
     drive = room_drive("one", "corridor 1", corridor(1), WAY[:2], 1)
     messages = [message for message in drive.messages() if not isinstance(message, TruePose)]
     stamps = np.array([message.stamp for message in messages if isinstance(message, LaserScan)])
-    parts = parts_of_log("log", messages, stamps, np.zeros((len(stamps), 3)), 3)
+    parts = parts_of_log("log", messages, stamps, np.zeros((len(stamps), 3)), np.linspace(0.0, 1.0, 4))
     found = [m for part in parts for m in part.messages() if not isinstance(m, TruePose)]
     assert len({(type(m), m.stamp) for m in found}) == len({(type(m), m.stamp) for m in messages})

@@ -32,7 +32,7 @@ def test_each_doubt_alone_keeps_maps_apart(change: dict[str, float], why: str) -
 
 
 def test_doubts_add_up() -> None:
-    doubtful = Evidence(corners=0, walls=0, agreeing=40.0, contradicted=0.6 * CONTRADICTED, way=20.0, rival=0.45)
+    doubtful = Evidence(corners=0, walls=0, agreeing=80.0, contradicted=0.6 * CONTRADICTED, way=20.0, rival=0.45)
     assert max(doubts(doubtful).values()) < 1.0
     assert reason(doubtful) == "contradicted"
 
@@ -42,6 +42,14 @@ def test_only_corners_beyond_chance_excuse_what_was_seen_through() -> None:
     assert reason(moved) is None
     assert reason(replace(moved, corners=5)) == "contradicted"
     assert doubts(replace(moved, corners=5)) == doubts(replace(moved, corners=0))
+
+
+def test_bare_walls_must_agree_over_more_than_walls_with_corners() -> None:
+    """What two office floors had in common, seen in 12 m of way each: 38 m of corridor, and four corners by chance."""
+    strangers = Evidence(corners=4, walls=12, agreeing=38.2, contradicted=0.0129, way=7.5, rival=0.301)
+    assert reason(strangers) is not None
+    assert hurdle(strangers) > 1.2
+    assert reason(replace(strangers, corners=14)) is None
 
 
 def test_a_verdict_and_its_hurdle_agree() -> None:

@@ -113,8 +113,8 @@ def mapped(drive: Drive, cache: Path | None = None) -> Mapped:
     return Mapped(drive.name, drive.building, saved, truth)
 
 
-def corridor(seed: int, *, opened: float = 0.5) -> Room:
-    """Draw a corridor of 29 m like all others: width, doors and rooms are the same; what stands in them is not.
+def corridor(seed: int, *, opened: float = 0.5, doors: int = DOORS, storey: int | None = None) -> Room:
+    """Draw a corridor like all others: width, doors and rooms are the same; what stands in them is not.
 
     Parameters
     ----------
@@ -122,15 +122,21 @@ def corridor(seed: int, *, opened: float = 0.5) -> Room:
         Of the furniture, and of which doors are open.
     opened : float
         Share of the doors that are open.
+    doors : int
+        On either side.
+    storey : int, optional
+        Of a tower: of one to the other only the furniture in the rooms differs, and `seed` says which doors are open,
+        how far, and what stands in the corridor.
     """
-    chance, length, half = np.random.default_rng([seed, 29]), DOORS * PITCH, 0.5 * WIDTH
+    chance, length, half = np.random.default_rng([seed, 29]), doors * PITCH, 0.5 * WIDTH
+    inside = chance if storey is None else np.random.default_rng([seed, 29, storey])
     pieces: list[Piece] = []
-    middles = PITCH * (np.arange(DOORS) + 0.5)
+    middles = PITCH * (np.arange(doors) + 0.5)
     gaps = [(float(m), GAP) for m in middles]
     for side in (-1.0, 1.0):
         wall = side * (half + 0.06)
         pieces += partition((0.0, wall), (length, wall), STOREY, *gaps)
-        for edge in PITCH * np.arange(1, DOORS):
+        for edge in PITCH * np.arange(1, doors):
             ends = sorted((side * (half + 0.12), side * (half + DEPTH)))
             pieces += partition((float(edge), ends[0]), (float(edge), ends[1]), STOREY)
         for middle in middles.tolist():
@@ -139,10 +145,10 @@ def corridor(seed: int, *, opened: float = 0.5) -> Room:
                 continue
             swing = 90.0 + chance.uniform(-25.0, 25.0)
             pieces.append(door((middle - 0.5 * GAP - 0.03, side * (half + 0.1)), side * swing, 0.95))
-            for _ in range(int(chance.integers(2, 5))):
-                x = middle + chance.uniform(-1.3, 1.3)
-                y = side * (half + chance.uniform(1.5, DEPTH - 0.4))
-                long, wide, turn = chance.uniform((0.4, 0.3, -30.0), (1.4, 0.7, 30.0)).tolist()
+            for _ in range(int(inside.integers(2, 5))):
+                x = middle + inside.uniform(-1.3, 1.3)
+                y = side * (half + inside.uniform(1.5, DEPTH - 0.4))
+                long, wide, turn = inside.uniform((0.4, 0.3, -30.0), (1.4, 0.7, 30.0)).tolist()
                 pieces.append(Box(x, y, long, wide, 1.2, turn))
         for spot in chance.uniform(0.5, length - 0.5, int(chance.integers(0, 4))).tolist():
             if np.abs(middles - spot).min() > 1.2:
@@ -199,8 +205,8 @@ def mirrored(drive: Drive) -> Drive:
     return Drive(f"{drive.name}_mirrored", f"{drive.building} mirrored", messages, drive.mount)
 
 
-def parts_of_log(name: str, messages: Sequence[Message], stamps: Floats, poses: Floats, parts: int) -> list[Drive]:
-    """Describe the parts of a log, of equal duration.
+def parts_of_log(name: str, messages: Sequence[Message], stamps: Floats, poses: Floats, edges: Floats) -> list[Drive]:
+    """Describe the parts of a log.
 
     Parameters
     ----------
@@ -209,10 +215,12 @@ def parts_of_log(name: str, messages: Sequence[Message], stamps: Floats, poses: 
         In the order of the file.
     stamps, poses : ndarray, shape (s,) and (s, 3)
         Of the scans, as a run over the whole log has them: the truth.
-    parts : int
+    edges : ndarray, shape (parts + 1,)
+        Where each begins and the last one ends, as parts of the whole duration, ascending from 0 to 1.
     """
     times = [message.stamp for message in messages]
-    edges = np.linspace(min(times), max(times), parts + 1)
+    parts = len(edges) - 1
+    edges = min(times) + (max(times) - min(times)) * edges
     true = [TruePose(float(stamp), pose) for stamp, pose in zip(stamps, poses, strict=True)]
 
     def part(number: int) -> Callable[[], Iterable[Message]]:

@@ -8,7 +8,9 @@ CONTRADICTED = 0.04  # part of the surfaces that were seen through, where corner
 # Furniture is moved, and where corners were found again by more than chance, that is likelier than another building.
 BY_CHANCE, TWICE, MOST = 6, 8, 20  # corners; more than are there by chance that allow for twice as much; that count
 RIVAL = 0.9  # what speaks for another way of laying them, as a part of what speaks for this one
-LITTLE = 10.0  # m of surfaces that both have
+# Walls of bare corridors are alike everywhere, and two that begin at a junction agree over dozens of metres.
+BARE, LITTLE = 25.0, 10.0  # m of surfaces that both have: where corners tell nothing; where they tell much
+HALF = 4  # corners; more than are there by chance, with which half as many metres as of bare walls will do
 LEAST_WAY = 4.0  # m
 ALIKE = 5.0  # m of surfaces; below, two maps have nothing alike
 AGAINST = 2.0  # what a surface that was seen through counts against one that was found, where two ways are compared
@@ -33,7 +35,7 @@ def doubts(evidence: Evidence) -> dict[Reason, float]:
     return {
         "contradicted": evidence.contradicted / (CONTRADICTED * (1.0 + corners / TWICE)),
         "ambiguous": evidence.rival / RIVAL,
-        "too little": LITTLE / max(evidence.agreeing, 1e-9),
+        "too little": max(BARE / (1.0 + corners / HALF), LITTLE) / max(evidence.agreeing, 1e-9),
     }
 
 
