@@ -24,9 +24,8 @@ def drives(shared: Shared) -> Iterator[tuple[str, int, Floats, Floats]]:
     """Give each drive of a common map: robot, run, stamps (s) and poses of its keyframes, shapes (k,) and (k, 3)."""
     keyframes = shared.saved.keyframes
     if keyframes is not None:
-        for drive, (robot, run) in enumerate(shared.members):
-            mine = keyframes.drives == drive
-            yield robot, run, keyframes.stamps[mine], keyframes.poses[mine]
+        for (robot, run), rows in zip(shared.members, shared.rows, strict=True):
+            yield robot, run, keyframes.stamps[rows], keyframes.poses[rows]
 
 
 def fleet_markers(
