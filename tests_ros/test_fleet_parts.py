@@ -127,7 +127,7 @@ def test_sites_are_read_and_what_names_none_is_refused() -> None:
 class Unsendable:
     """A reporter that once has something which cannot be sent, wherever it is asked."""
 
-    waiting, settled, run = 0, True, 1
+    waiting, settled, run, given_up, left_out = 0, True, 1, 0, 0
 
     def __init__(self, robot: str, *, period: float) -> None:
         self.asked: list[str] = []

@@ -145,6 +145,8 @@ class FleetLink:
             "common map": "" if answer is None else str(answer.common),
             "members": "" if answer is None else ", ".join(answer.members),
             "failures": str(self._failures),
+            "given up": str(self._reporter.given_up),
+            "left out": str(self._reporter.left_out),
         }
         if time.monotonic() - self._failed < TOLD:
             return Diagnostic(Level.ERROR, "fleet", f"the fleet is not told all: {self._failure}", values)
@@ -160,6 +162,9 @@ class FleetLink:
             )
         others = [] if answer is None else [name for name in answer.members if name != self._config.fleet]
         company = f"shares a map with {', '.join(others)}" if others else "has met no other robot yet"
+        if self._reporter.given_up or self._reporter.left_out:
+            lost = f"{self._reporter.given_up} reports were given up, {self._reporter.left_out} facts not sent whole"
+            return Diagnostic(Level.WARN, "fleet", f"connected; {company}; {lost}", values)
         return Diagnostic(Level.OK, "fleet", f"connected; {company}", values)
 
     # In the node's thread.
