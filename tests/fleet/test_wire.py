@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from contourslam.errors import MessageError
-from contourslam.fleet import wire_contours, wire_facts
+from contourslam.fleet import wire_contours, wire_facts, wire_sightings
 from contourslam.fleet.compact import Reader, Writer
 from contourslam.fleet.facts import Answer, Fact, KeyframeFact, RelationFact, Report, Status, StretchFact
 from contourslam.fleet.wire import HEAD, LONGEST, decode, encode
@@ -140,13 +140,15 @@ def assert_contour(points: Any, told: Any) -> None:
 
 def assert_sightings(seen: Any, told: Any) -> None:
     assert (seen[:, [0, 5]] == told[:, [0, 5]]).all()
-    np.testing.assert_allclose(seen[:, 1:3], told[:, 1:3], rtol=0, atol=0.51 * wire_facts.POINT)
-    np.testing.assert_allclose(seen[:, 3:5], told[:, 3:5], rtol=0, atol=0.51 * wire_facts.DIRECTION)
-    np.testing.assert_allclose(seen[:, 6:8], told[:, 6:8], rtol=0, atol=1.01 * wire_facts.LENGTH)
+    np.testing.assert_allclose(seen[:, 1:3], told[:, 1:3], rtol=0, atol=0.51 * wire_sightings.POINT)
+    np.testing.assert_allclose(seen[:, 3:5], told[:, 3:5], rtol=0, atol=0.51 * wire_sightings.DIRECTION)
+    np.testing.assert_allclose(seen[:, 6:8], told[:, 6:8], rtol=0, atol=1.01 * wire_sightings.LENGTH)
     np.testing.assert_allclose(seen[:, [8, 10, 12]], told[:, [8, 10, 12]], rtol=0.05)
     for column, other in ((9, 10), (11, 12)):
         both = np.sqrt(told[:, 8] * told[:, other])
-        assert (np.abs(seen[:, column] - told[:, column]) <= (0.5 / wire_facts.CORRELATION + 0.05) * both + 1e-9).all()
+        assert (
+            np.abs(seen[:, column] - told[:, column]) <= (0.5 / wire_sightings.CORRELATION + 0.05) * both + 1e-9
+        ).all()
 
 
 def assert_spread(matrix: Any, told: Any) -> None:

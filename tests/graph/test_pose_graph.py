@@ -10,7 +10,8 @@ from contourslam.geometry.poses import between, compose
 
 pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 
-from contourslam.graph.pose_graph import PoseGraph, joined, noise_model, poses_of, solve, spreads, square_root
+from contourslam.graph.pose_graph import PoseGraph, joined, noise_model, poses_of, solve, spreads
+from contourslam.matching.small import square_root
 
 Floats = NDArray[np.float64]
 SHARP = np.diag([1e4, 1e4, 4e4])  # 1 cm, 0.3 degrees

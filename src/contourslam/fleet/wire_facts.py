@@ -4,36 +4,31 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.errors import MessageError
-from contourslam.fleet import wire_contours
-from contourslam.fleet.compact import Bytes, Reader, States, Writer, take
+from contourslam.fleet import wire_contours, wire_sightings
+from contourslam.fleet.compact import Reader, Writer
 from contourslam.fleet.facts import Fact, KeyframeFact, RelationFact, StretchFact
-from contourslam.kernels import kernel
-from contourslam.slam.measurement import WALL
+from contourslam.fleet.wire_sightings import LEAST_VARIANCE, OCTAVE, SIGHTING, sighting_numbers, take_sightings
+from contourslam.matching.small import square_root
 
 PLACE, HEADING = 0.001, 1e-4  # of a keyframe's pose, m and rad: where the server begins to look
 APART, TURN = 1e-4, 5e-5  # of relative poses, m and rad: no match is surer than 1 mm and 0.02 degrees
 STAMP = 1e-6  # s
-OCTAVE, LEAST_VARIANCE = 8, 1e-12  # steps a doubling of variances, and the least that is not taken for none
 ROOTS, LEAST_ROOT, LEAN = 32, 1e-9, 32  # the same of roots of matrices; steps of their other numbers
-CORRELATION = 16
 KERNEL = 1e-3  # of a robust kernel's width
-POINT, DIRECTION, LENGTH = 0.005, 2.0 * math.pi / 1024, 0.02  # of sightings: m, rad, m
 FARTHEST = 1e10  # m, s, rad: beyond it a number is none
 MOST_FACTS, MOST_SEEN, MOST_MEMBERS = 10_000, 5_000, 10_000
 
 # Contexts. Of poses three each, of matrices seven: which roots are none, roots, leanings.
 (FACT, NUMBER, WHEN, BLUR, DRIVE, POINTS, SIGHTINGS, FROM, TO, WIDTH, TIE, ANCHOR, MEMBERS, MEMBER) = range(
-    wire_contours.CONTEXTS, wire_contours.CONTEXTS + 14
+    wire_sightings.CONTEXTS, wire_sightings.CONTEXTS + 14
 )
 POSE, RELATIVE, MEMBER_POSE = MEMBER + 1, MEMBER + 4, MEMBER + 7
 INFORMATION = MEMBER + 10  # seven for each kind of relation
 KINDS = 3
-SIGHTING = INFORMATION + 7 * KINDS  # 13 of corners, 13 of walls
-CONTEXTS = SIGHTING + 26
+CONTEXTS = INFORMATION + 7 * KINDS
 # About how many bits the numbers of each context have: else the first few of a message would cost twice as much.
 _SIZES = {
     **{wire_contours.BEARING + n: bits for n, bits in enumerate((1, 2, 4, 4))},
@@ -47,8 +42,6 @@ _SIZES = {
     **{SIGHTING + 13 + n: bits for n, bits in enumerate((0, 9, 8, 8, 0, 0, 6, 0, 8, 0, 0, 0, 8))},
 }
 SIZES = tuple(_SIZES.get(context, 0) for context in range(CONTEXTS))
-
-(_KIND, _X, _Y, _DIRECTION, _OPENING, _CONVEX, _START, _END, _PXX, _PXY, _PYY, _PXT, _PTT) = range(13)
 
 
 def in_steps(value: float, step: float) -> int:
@@ -112,25 +105,6 @@ def take_variance(step: int) -> float:
     return LEAST_VARIANCE * 2.0 ** ((step - 1) / OCTAVE) if step else 0.0
 
 
-@kernel
-def _root(matrix: Floats) -> Floats:
-    """Upper R with R^T R = matrix, by Cholesky; a row of zeros where a direction has nothing left."""
-    r = np.zeros((3, 3))
-    for i in range(3):
-        pivot = matrix[i, i]
-        for k in range(i):
-            pivot -= r[k, i] * r[k, i]
-        if pivot <= 1e-12 * matrix[i, i] or pivot <= LEAST_ROOT * LEAST_ROOT:
-            continue
-        r[i, i] = math.sqrt(pivot)
-        for j in range(i + 1, 3):
-            rest = matrix[i, j]
-            for k in range(i):
-                rest -= r[k, i] * r[k, j]
-            r[i, j] = rest / r[i, i]
-    return r
-
-
 def put_matrix(writer: Writer, context: int, matrix: Floats, before: Ints) -> None:
     """Add a covariance or information by its root: any whole numbers give a matrix that is one.
 
@@ -141,7 +115,7 @@ def put_matrix(writer: Writer, context: int, matrix: Floats, before: Ints) -> No
     """
     if not (np.abs(matrix) < 1e18).all():
         raise MessageError("a covariance that is not finite cannot be sent")
-    root = _root(np.ascontiguousarray(matrix, np.float64))
+    root = square_root(np.ascontiguousarray(matrix, np.float64), LEAST_ROOT * LEAST_ROOT)
     sizes = [0 if d <= 0.0 else 1 + max(round(ROOTS * math.log2(d / LEAST_ROOT)), 0) for d in np.diag(root).tolist()]
     own = [_size(size) for size in sizes]
     for i in range(3):
@@ -176,69 +150,6 @@ def take_matrix(reader: Reader, context: int, before: Ints) -> Floats:
 
 def _size(step: int) -> float:
     return LEAST_ROOT * 2.0 ** ((step - 1) / ROOTS) if step else 0.0
-
-
-@kernel
-def _take_rows(data: Bytes, state: Ints, states: States, rows: Ints) -> bool:
-    for i in range(rows.shape[0]):
-        kind = take(data, state, states, SIGHTING)
-        if kind != 0 and kind != 1:
-            return False
-        rows[i, 0] = kind
-        for column in range(1, 13):
-            rows[i, column] = take(data, state, states, SIGHTING + 13 * kind + column)
-    return True
-
-
-def _sighting_steps(seen: NDArray[np.float32]) -> Ints:
-    rows: Floats = np.asarray(seen, np.float64).reshape(-1, 13)
-    if not (np.abs(rows) < 1e6).all() or not np.isin(rows[:, _KIND], (0.0, WALL)).all():
-        raise MessageError("sightings that are not finite, or neither corners nor walls, cannot be sent")
-    steps = np.zeros(rows.shape, np.int64)
-    steps[:, _KIND], steps[:, _CONVEX] = rows[:, _KIND], rows[:, _CONVEX] > 0.5
-    steps[:, [_X, _Y]] = np.rint(rows[:, [_X, _Y]] / POINT)
-    steps[:, [_DIRECTION, _OPENING]] = np.rint(rows[:, [_DIRECTION, _OPENING]] / DIRECTION)
-    steps[:, [_START, _END]] = np.rint(rows[:, [_START, _END]] / LENGTH)
-    steps[:, _END] += np.where(steps[:, _KIND] == WALL, steps[:, _START], 0)  # a wall's ends mirror each other
-    variances = rows[:, [_PXX, _PYY, _PTT]]
-    logarithms = 1 + np.rint(OCTAVE * np.log2(np.maximum(variances, LEAST_VARIANCE) / LEAST_VARIANCE))
-    steps[:, [_PXX, _PYY, _PTT]] = np.where(variances < LEAST_VARIANCE, 0, logarithms)
-    spreads = _spreads(steps)
-    for column, other in ((_PXY, 1), (_PXT, 2)):
-        both = spreads[:, 0] * spreads[:, other]
-        share = np.divide(rows[:, column], both, out=np.zeros(len(rows)), where=both > 0.0)
-        steps[:, column] = np.clip(np.rint(CORRELATION * share), 1 - CORRELATION, CORRELATION - 1)
-    return steps
-
-
-def _spreads(steps: Ints) -> Floats:
-    """Standard deviations across, along and of the direction, shape (n, 3)."""
-    logarithms = steps[:, [_PXX, _PYY, _PTT]]
-    return np.where(logarithms > 0, math.sqrt(LEAST_VARIANCE) * 2.0 ** ((logarithms - 1) / (2.0 * OCTAVE)), 0.0)
-
-
-def _from_sighting_steps(steps: Ints) -> NDArray[np.float32]:
-    spreads, rows = _spreads(steps), np.zeros(steps.shape)
-    rows[:, _KIND], rows[:, _CONVEX] = steps[:, _KIND], steps[:, _CONVEX]
-    rows[:, [_X, _Y]] = steps[:, [_X, _Y]] * POINT
-    rows[:, [_DIRECTION, _OPENING]] = steps[:, [_DIRECTION, _OPENING]] * DIRECTION
-    rows[:, _START] = steps[:, _START] * LENGTH
-    rows[:, _END] = (steps[:, _END] - np.where(steps[:, _KIND] == WALL, steps[:, _START], 0)) * LENGTH
-    rows[:, [_PXX, _PYY, _PTT]] = spreads**2
-    rows[:, _PXY] = steps[:, _PXY] * spreads[:, 0] * spreads[:, 1] / CORRELATION
-    rows[:, _PXT] = steps[:, _PXT] * spreads[:, 0] * spreads[:, 2] / CORRELATION
-    return rows.astype(np.float32)
-
-
-def _take_sightings(reader: Reader, count: int) -> NDArray[np.float32]:
-    steps = np.zeros((count, 13), np.int64)
-    sound = _take_rows(*reader.parts, steps)
-    reader.check()
-    logarithms, shares = steps[:, [_PXX, _PYY, _PTT]], steps[:, [_PXY, _PXT]]
-    sound = sound and bool((logarithms >= 0).all() and (logarithms <= 80 * OCTAVE).all())
-    if not sound or (np.abs(shares) >= CORRELATION).any() or (np.abs(steps) > 1 << 40).any():
-        raise MessageError("a sighting in it is neither corner nor wall; it is damaged or foreign")
-    return _from_sighting_steps(steps)
 
 
 class _Thread:
@@ -298,11 +209,8 @@ def _put_keyframe(writer: Writer, fact: KeyframeFact, thread: _Thread) -> None:
     writer.put(BLUR, put_variance(fact.blur))
     writer.count(POINTS, len(fact.points), wire_contours.MOST_POINTS)
     writer.extend(*wire_contours.contour_numbers(fact.points))
-    steps = _sighting_steps(fact.seen)
-    writer.count(SIGHTINGS, len(steps), MOST_SEEN)
-    contexts = SIGHTING + 13 * steps[:, :1] + np.arange(13)
-    contexts[:, 0] = SIGHTING
-    writer.extend(contexts.ravel(), steps.ravel())
+    writer.count(SIGHTINGS, len(fact.seen), MOST_SEEN)
+    writer.extend(*sighting_numbers(fact.seen))
     thread.number = thread.key = fact.number
     thread.stamp, thread.drive = stamp, fact.drive
 
@@ -314,7 +222,7 @@ def _take_keyframe(reader: Reader, thread: _Thread) -> KeyframeFact:
     pose = take_pose(reader, POSE, PLACE, HEADING, thread.pose)
     blur = take_variance(reader.take(BLUR))
     points = wire_contours.take_contour(reader, reader.count(POINTS, wire_contours.MOST_POINTS))
-    seen = _take_sightings(reader, reader.count(SIGHTINGS, MOST_SEEN))
+    seen = take_sightings(reader, reader.count(SIGHTINGS, MOST_SEEN))
     return KeyframeFact(thread.number, thread.stamp * STAMP, pose, blur, points, seen, thread.drive)
 
 

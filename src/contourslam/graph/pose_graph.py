@@ -1,37 +1,16 @@
 """A factor graph of poses in the plane, over GTSAM: grown step by step by iSAM2, or solved at once."""
 
-import math
 from collections.abc import Sequence
 
 import gtsam
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.kernels import kernel
-from contourslam.matching.small import turned
+from contourslam.matching.small import square_root, turned
 
 # Variables are all Pose2: keyframes, corners (position and direction of the bisector), walls (a point and the normal).
 RELINEARIZE = 3  # updates after which iSAM2 looks for what it must linearise anew
 Robust = float | None  # width of a Cauchy kernel in standard deviations
-
-
-@kernel
-def square_root(information: Floats) -> Floats:
-    """Upper R with R^T R = information, by Cholesky; a direction without information gives a row of zeros."""
-    r = np.zeros((3, 3))
-    for i in range(3):
-        pivot = information[i, i]
-        for k in range(i):
-            pivot -= r[k, i] * r[k, i]
-        if pivot <= 1e-12 * information[i, i] or pivot <= 0.0:
-            continue
-        r[i, i] = math.sqrt(pivot)
-        for j in range(i + 1, 3):
-            rest = information[i, j]
-            for k in range(i):
-                rest -= r[k, i] * r[k, j]
-            r[i, j] = rest / r[i, i]
-    return r
 
 
 def noise_model(information: Floats, robust: Robust) -> gtsam.noiseModel.Base:

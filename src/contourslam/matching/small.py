@@ -79,3 +79,22 @@ def moved(pose: Floats, covariance: Floats, increment: Floats, noise: Floats) ->
     out[2, 2] += p[2, 2]
     out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
     return end, out
+
+
+@kernel
+def square_root(matrix: Floats, least: float = 0.0) -> Floats:
+    """Upper R with R^T R = matrix, by Cholesky; a direction with no more than `least` gives a row of zeros."""
+    r = np.zeros((3, 3))
+    for i in range(3):
+        pivot = matrix[i, i]
+        for k in range(i):
+            pivot -= r[k, i] * r[k, i]
+        if pivot <= 1e-12 * matrix[i, i] or pivot <= least:
+            continue
+        r[i, i] = math.sqrt(pivot)
+        for j in range(i + 1, 3):
+            rest = matrix[i, j]
+            for k in range(i):
+                rest -= r[k, i] * r[k, j]
+            r[i, j] = rest / r[i, i]
+    return r
