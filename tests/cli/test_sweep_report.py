@@ -52,7 +52,8 @@ def test_json_is_the_file_of_metrics(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_several_results_are_reported_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folders = [str(results(tmp_path / name)) for name in ("one", "other")]
     assert main(["sweep-report", *folders, "-o", str(tmp_path / "out"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["runs"] == 6  # the same runs, once
+    assert (said := json.loads(capsys.readouterr().out))["runs"] == 6  # the same runs, once
+    assert said["expected"] == 12
 
 
 @pytest.mark.parametrize(
@@ -62,6 +63,9 @@ def test_several_results_are_reported_as_one(tmp_path: Path, capsys: pytest.Capt
         (["empty", "-o", "out"], "no run is done yet"),
         (["there", "-o", "out", "--metric", "positoin"], "position"),
         (["there", "-o", "there", "--overwrite"], "choose another folder"),
+        (["there", "-o", "there/report"], "is in the results there"),
+        (["there", "-o", "out", "--markdown", "full/mine/a.md"], "full/mine/a.md: cannot be written"),
+        (["there", "-o", "out", "--markdown", "full"], "full: is a folder"),
         (["there", "-o", "full"], "is not empty"),
     ],
 )

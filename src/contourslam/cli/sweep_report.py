@@ -5,8 +5,9 @@ from pathlib import Path
 
 import tyro
 
-from contourslam.cli.console import chosen, keep_apart, prepare_folder, print_json
+from contourslam.cli.console import chosen, prepare_folder, print_json
 from contourslam.cli.options import Json, Output, Overwrite
+from contourslam.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,16 @@ class SweepReport:
 
     def execute(self, command: str) -> int:
         """Write the report and print what can be said."""
-        from contourslam.report.sweep.markdown import write_markdown
+        from contourslam.report.sweep.markdown import check_place, write_markdown
         from contourslam.report.sweep.measures import COMPARABLE, MEASURES
         from contourslam.report.sweep.page import write_sweep_report
         from contourslam.report.sweep.reading import read_sweep
 
         choices = {name: MEASURES[name] for name in COMPARABLE}
         measures = [chosen("metric", name, choices) for name in dict.fromkeys(self.metric or COMPARABLE[:1])]
-        keep_apart(self.output, [Path(url) for url in self.results if "://" not in url])
+        self._keep_out_of_results()
+        if self.markdown is not None:
+            check_place(self.markdown)
         sweep = read_sweep(self.results)
         prepare_folder(self.output, overwrite=self.overwrite)
         metrics = write_sweep_report(self.output, sweep, measures, command=command)
@@ -53,3 +56,10 @@ class SweepReport:
                 print(f"by the {measure.title}:", *metrics["in_short"][measure.name], sep="\n  ")
             print(f"\nreport: {self.output / 'index.html'}")
         return 0
+
+    def _keep_out_of_results(self) -> None:
+        """Refuse to write into a folder of results, or anywhere below."""
+        for url in self.results:
+            place = url.removeprefix("file://")
+            if "://" not in place and self.output.resolve().is_relative_to(Path(place).resolve()):
+                raise ConfigError(f"{self.output} is in the results {url}; choose another folder with --output")

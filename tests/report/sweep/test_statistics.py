@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from contourslam.errors import ResultError
 from contourslam.report.sweep.figures import curves
 from contourslam.report.sweep.findings import Comparison, in_short, sentence
 from contourslam.report.sweep.measures import MEASURES
@@ -89,7 +90,7 @@ def test_the_wheels_are_those_of_each_drive_once(sweep_rows) -> None:
 
 
 def test_other_lidars_and_lengths_are_other_places(sweep_rows) -> None:
-    rows = sweep_rows(seeds=1, rooms=("large_hall",))
+    rows = sweep_rows(seeds=1, rooms=("large_hall",), conditions=[(0.01, 500)])
     longer = [row | {"duration": None, "lidar": "ydlidar_x4", "noise": None, "beams": None} for row in rows]
     sweep = sweep_of([*rows, *longer])
     assert sweep.rooms == ["large_hall, paper, 60 s", "large_hall, ydlidar_x4, whole duration"]
@@ -101,6 +102,12 @@ def test_of_two_rows_of_a_run_the_later_one_is_taken(sweep_rows) -> None:
     sweep = sweep_of([*rows, rows[0] | {"rmse.x": 1.0, "rmse.y": 0.0}])
     assert len(sweep.runs) == len(rows)
     assert max(POSITION.of(run.row) for run in sweep.runs) == 1.0
+
+
+def test_runs_of_one_name_and_two_configurations_are_refused(sweep_rows) -> None:
+    (row, *_), other = sweep_rows(seeds=1), {"key": "f" * 32, "config": "another", "results": "out/b"}
+    with pytest.raises(ResultError, match=r"^out/a and out/b: setting 'corners' with .* two different configurations;"):
+        sweep_of([row | {"config": "one", "results": "out/a"}, row | other])
 
 
 def test_a_measure_that_is_not_there_is_not_known() -> None:
@@ -138,8 +145,8 @@ def test_differences_that_failures_made_infinite_are_said_to_be_left_out(sweep_r
 @pytest.mark.parametrize(
     ("factors", "said"),
     [
-        ((0.8, 1.0, 1.0, 1.0), "Better than every other: matched filter (corners, both)."),
-        ((1.0, 1.0, 1.3, 1.0), "Worse than every other: Teh-Chin (corners, both)."),
+        ((0.8, 1.0, 1.0, 1.0), "Better than every other: matched filter (corners: both)."),
+        ((1.0, 1.0, 1.3, 1.0), "Worse than every other: Teh-Chin (corners: both)."),
         ((1.0, 1.0, 1.0, 1.0), "No detector is shown to be better than another in 1 comparison "),
     ],
 )

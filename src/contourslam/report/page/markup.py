@@ -68,13 +68,16 @@ def paragraph(text: str, kind: str = "") -> str:
     return f"<p{attribute}>{escape(text)}</p>"
 
 
-def table(caption: str, headers: Sequence[str], rows: Sequence[Row]) -> str:
-    """Give a table with a caption and header cells, to be copied as CSV or LaTeX; it scrolls where it is too wide."""
+def table(caption: str, headers: Sequence[str], rows: Sequence[Row], *, stacked: bool = False) -> str:
+    """Give a table with a caption and header cells, to be copied as CSV or LaTeX; it scrolls where it is too wide.
+
+    One that is stacked is made narrow: heads and long cells are wrapped, small print stands below its number.
+    """
     head = "".join(f'<th scope="col">{escape(header)}</th>' if header else "<td></td>" for header in headers)
     body = "\n".join(_row(row) for row in rows)
     return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
-        f"<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>\n"
+        f'<div class="wide{" stacked" * stacked}" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
+        f"<caption><span>{escape(caption)}</span></caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>\n"
         f'<p class="copy" hidden>{_copy("CSV", to_csv(headers, rows))} '
         f'{_copy("LaTeX", to_latex(caption, headers, rows))} <span role="status"></span></p>'
     )
@@ -91,8 +94,11 @@ def _row(row: Row) -> str:
     return f'<tr{kind}><th scope="row">{escape(row.name)}</th>{"".join(map(_cell, row.cells))}</tr>'
 
 
+_LONG = 16  # characters from which a cell is words to be wrapped where the table is stacked
+
+
 def _cell(cell: Cell) -> str:
-    kind = ' class="better"' if cell.better else ""
+    kind = ' class="better"' if cell.better else ' class="words"' if len(cell.text) > _LONG else ""
     small = f" <small>{escape(cell.small)}</small>" if cell.small else ""
     return f"<td{kind}>{escape(cell.text)}{small}</td>"
 

@@ -3,11 +3,14 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from contourslam.report.naming import label
 from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import Pair
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +66,8 @@ def in_short(found: Sequence[Comparison], measure: Measure) -> list[str]:
     of = f"{counted(len(found), 'comparison')} (a setting in a room, or in all rooms)"
     if not any(one.shown for one in found):
         return [f"No detector is shown to be better than another in {of}."]
-    best = {one.name: name for one in found if (name := _alone(one, lambda pair: str(pair.better)))}
-    worst = {one.name: name for one in found if (name := _alone(one, _loser))}
+    best = [(name, one) for one in found if (name := _alone(one, lambda pair: str(pair.better)))]
+    worst = [(name, one) for one in found if (name := _alone(one, _loser))]
     said = [
         f"Better than every other: {_places(best)}." if best else f"No detector is better than every other in {of}."
     ]
@@ -75,24 +78,29 @@ def in_short(found: Sequence[Comparison], measure: Measure) -> list[str]:
         size, one, pair = max(sizes, key=lambda each: each[0])
         told = f"{_names([_loser(pair)])} has {_amount(size, measure)} more than {label(str(pair.better))}"
         said.append(f"The largest difference shown: {told} ({one.name}).")
-    nothing = [one.name for one in found if not one.shown]
-    if nothing:
-        said.append(f"No difference is shown in {len(nothing)} of {len(found)}: {'; '.join(nothing)}.")
+    settings = _by(found, lambda one: one.setting)
+    lacking = {setting: sum(not one.shown for one in mine) for setting, mine in settings.items()}
+    if any(lacking.values()):
+        each = [f"{label(setting)} {lacking[setting]} of {len(mine)}" for setting, mine in settings.items()]
+        said.append(f"Comparisons in which no difference is shown: {', '.join(each)}.")
     return said
 
 
 def _alone(one: Comparison, key: Callable[[Pair], str]) -> str | None:
     """Detector that is better, or worse, than every other."""
     detectors = {name for pair in one.pairs for name in (pair.first, pair.second)}
-    groups = _grouped(one.shown, key)
+    groups = _by(one.shown, key)
     return next((name for name, group in groups.items() if len(group) == len(detectors) - 1), None)
 
 
-def _places(names: Mapping[str, str]) -> str:
-    detectors = dict.fromkeys(names.values())
-    return ", ".join(
-        f"{label(name)} ({'; '.join(place for place, other in names.items() if other == name)})" for name in detectors
-    )
+def _places(found: Sequence[tuple[str, Comparison]]) -> str:
+    """Name detectors, each with the comparisons, setting by setting."""
+    said = []
+    for name, mine in _by(found, lambda each: each[0]).items():
+        settings = _by([one for _, one in mine], lambda one: one.setting)
+        where = (f"{label(setting)}: {', '.join(one.where for one in ones)}" for setting, ones in settings.items())
+        said.append(f"{label(name)} ({'; '.join(where)})")
+    return ", and ".join(said)
 
 
 def _larger(pair: Pair) -> float:
@@ -114,7 +122,7 @@ def _said(found: Sequence[Pair], measure: Measure) -> str:
     if not shown:
         few = {pair.test.verdict for pair in found} == {"too few seeds"}
         return "too few seeds to show anything." if few else f"no difference shown{_reach(found, measure)}."
-    winners, losers = _grouped(shown, lambda pair: str(pair.better)), _grouped(shown, _loser)
+    winners, losers = _by(shown, lambda pair: str(pair.better)), _by(shown, _loser)
     if len(winners) <= len(losers):
         said = [f"{label(name)} is better than {_names(map(_loser, group))}" for name, group in winners.items()]
         groups = winners
@@ -128,10 +136,10 @@ def _said(found: Sequence[Pair], measure: Measure) -> str:
     return f"{'; '.join(sized)}.{' No other difference is shown.' * (len(shown) < len(found))}"
 
 
-def _grouped(found: Sequence[Pair], key: Callable[[Pair], str]) -> dict[str, list[Pair]]:
-    groups: dict[str, list[Pair]] = {}
-    for pair in found:
-        groups.setdefault(key(pair), []).append(pair)
+def _by(found: Sequence[T], key: Callable[[T], str]) -> dict[str, list[T]]:
+    groups: dict[str, list[T]] = {}
+    for one in found:
+        groups.setdefault(key(one), []).append(one)
     return groups
 
 

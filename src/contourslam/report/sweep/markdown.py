@@ -5,6 +5,7 @@ replaced. So a document can hold numbers that nobody typed.
 """
 
 import re
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +20,24 @@ from contourslam.report.sweep.values import Sweep
 
 _PICTURES = "pictures"
 _PLACE = re.compile(r"<!-- sweep:([\w-]+) -->\n.*?<!-- /sweep:\1 -->", re.DOTALL)
+
+
+def check_place(path: Path) -> None:
+    """Refuse a Markdown file that cannot be written, before any work is done for it.
+
+    Raises
+    ------
+    ResultError
+        If it is a folder, or its folder cannot be made or written.
+    """
+    if path.is_dir():
+        raise ResultError(f"{path}: is a folder; name a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be written ({error.strerror or error}); choose another file") from error
 
 
 def write_markdown(path: Path, sweep: Sweep, measures: Sequence[Measure], *, command: str = "") -> list[Path]:

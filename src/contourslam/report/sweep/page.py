@@ -17,6 +17,7 @@ from contourslam.report.page import album, markup
 from contourslam.report.page.tables import to_csv, to_latex
 from contourslam.report.result_folder import to_json
 from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Points, Table, Words
+from contourslam.report.sweep.findings import counted
 from contourslam.report.sweep.measures import MEASURES, Measure
 from contourslam.report.sweep.parts import Parts
 from contourslam.report.sweep.statistics import Pair, summary
@@ -133,11 +134,13 @@ def _pair(pair: Pair) -> dict[str, Any]:
 def _lead(sweep: Sweep) -> str:
     drives = len({run.drive for run in sweep.simulated})
     rooms = ", ".join(room.replace("_", " ") for room in sweep.rooms)
-    said = f"{len(sweep.runs):,} runs of {len(sweep.detectors)} detectors"
+    said = f"{counted(len(sweep.runs), 'run')} of {counted(len(sweep.detectors), 'detector')}"
     if drives:
-        said += f" over {drives} simulated drives ({rooms})"
+        said += f" over {counted(drives, 'simulated drive')} ({rooms})"
     if sweep.recorded:
-        said += f"{' and' if drives else ' over'} {len({run.drive for run in sweep.recorded})} real recordings"
+        said += (
+            f"{' and' if drives else ' over'} {counted(len({run.drive for run in sweep.recorded}), 'real recording')}"
+        )
     return f"{said}. “Better” stands here only where a test that is corrected for the number of comparisons says so."
 
 
@@ -154,7 +157,7 @@ def _html(item: Item, folder: Path) -> str:
         case Table(name, caption, headers, rows):
             write_text(folder / "tables" / f"{name}.csv", to_csv(headers, rows))
             write_text(folder / "tables" / f"{name}.tex", to_latex(caption, headers, rows))
-            return markup.table(caption, headers, rows)
+            return markup.table(caption, headers, rows, stacked=True)
         case Charts(charts):
             return f'<div class="pair">{"".join(_chart(chart, folder) for chart in charts)}</div>'
         case Folded(summary, items):

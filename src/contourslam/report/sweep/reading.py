@@ -9,8 +9,10 @@ from contourslam.experiments.sweep.files import open_place
 from contourslam.experiments.sweep.store import read_results
 from contourslam.report.sweep.values import Condition, Drive, Sweep, SweepRun
 
-_HEAVY = ("config", "traceback", "key", "skipped")
+_HEAVY = ("traceback", "skipped")
 """Columns that the report does without."""
+_FROM = "results"
+"""Column that is added: the folder or URL of a row."""
 _PLACE = ("lidar", "duration", "speed")
 """Axes that become a part of the place's name where the sweep has several of one."""
 
@@ -30,21 +32,25 @@ def read_sweep(urls: Sequence[str]) -> Sweep:
     Raises
     ------
     ResultError
-        If there are no results or no run was done yet, or a file cannot be read.
+        If there are no results or no run was done yet, a file cannot be read, or two runs go by the same name and are
+        of different configurations, recordings, detectors or programs.
     ConfigError, MissingExtraError
         If the kind of URL is unknown, or its library is not installed.
     """
-    rows, texts, expected = [], [], 0
+    rows: list[dict[str, Any]] = []
+    texts: list[str] = []
+    expected: set[str] = set()
     for url in urls:
         table = read_results(url)
-        rows += table.drop_columns([name for name in _HEAVY if name in table.column_names]).to_pylist()
+        found = table.drop_columns([name for name in _HEAVY if name in table.column_names]).to_pylist()
+        rows += [row | {_FROM: url} for row in found]
         system, path = open_place(url)
         experiment = json.loads(system.cat_file(f"{path}/experiment.json"))
         texts.append(str(experiment["text"]))
-        expected += len(experiment["keys"])
+        expected |= set(experiment["keys"])
     if not rows:
         raise ResultError(f"{', '.join(urls)}: no run is done yet; wait for the first, or go on: contourslam sweep")
-    return sweep_of(rows, texts, expected=expected)
+    return sweep_of(rows, texts, expected=len(expected))
 
 
 def sweep_of(
@@ -60,9 +66,19 @@ def sweep_of(
         The experiment files as they stand.
     expected : int, optional
         How many runs the experiments have.
+
+    Raises
+    ------
+    ResultError
+        If two rows of the same name are not of the same run.
     """
     several = [name for name in _PLACE if len({row.get(name) for row in rows if row["source"] == "simulation"}) > 1]
-    runs = {(run.drive, run.condition, run.detector): run for row in rows for run in [_run(row, several)]}
+    runs: dict[tuple[Drive, Condition, str], SweepRun] = {}
+    for run in (_run(row, several) for row in rows):
+        name = run.drive, run.condition, run.detector
+        if name in runs and runs[name].row["key"] != run.row["key"]:
+            raise ResultError(_differ(runs[name], run))
+        runs[name] = run
     return Sweep(tuple(runs.values()), tuple(experiments), expected)
 
 
@@ -78,6 +94,18 @@ def _run(row: Mapping[str, Any], several: Sequence[str]) -> SweepRun:
         drive, condition = Drive(str(row["recording"]), 0), Condition(setting, None, None)
     error = "" if row["status"] == "done" else f"{row.get('error_type')}: {row.get('error')}".splitlines()[0]
     return SweepRun(drive, condition, str(row["detector"]), simulated, error, row)
+
+
+def _differ(one: SweepRun, other: SweepRun) -> str:
+    """Say which two runs go by one name, and what differs."""
+    columns = (("config", "configurations"), ("recording_url", "recordings"), ("version", "versions of contourslam"))
+    found = (said for column, said in columns if one.row.get(column) != other.row.get(column))
+    places = " and ".join(dict.fromkeys(str(run.row.get(_FROM, "the results")) for run in (one, other)))
+    where = f"{one.drive.place}, seed {one.drive.seed}" if one.simulated else one.drive.place
+    return (
+        f"{places}: setting {one.condition.setting!r} with {one.detector} in {where} is of two different "
+        f"{next(found, 'detectors or recordings')}; rename one, or report them apart"
+    )
 
 
 def _told(name: str, value: Any) -> str:
