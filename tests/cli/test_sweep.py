@@ -24,7 +24,7 @@ FAILING = "".join((TEXT.replace('"wu"', '["wu", "bad"]'), '[own_detectors]\nbad 
 def sweep(tmp_path, monkeypatch, capsys):
     """Run the command on an experiment, with its runs done in this process."""
 
-    def here(runs, store, *, jobs, scheduler, observer):
+    def here(runs, store, *, jobs, scheduler, observer, say):
         over = do_runs(Task("session", program(), store.url, tuple(runs)), lambda *_: None)
         observer.progress(len(over), len(runs))
         failed = sum(status == "failed" for _, status in over)

@@ -90,7 +90,7 @@ class Sweep:
         store.forget_failed(run.key for run in todo)
         with Interrupt() as interrupt, _bar(len(todo)) as bar:
             observer = Observer(lambda over, _: bar.update(over - bar.n), lambda: interrupt.requested)
-            return sweep(todo, store, jobs=self.jobs, scheduler=self.scheduler, observer=observer)
+            return sweep(todo, store, jobs=self.jobs, scheduler=self.scheduler, observer=observer, say=note)
 
     def _say_cost(self, runs: "Sequence[Run]", todo: "Sequence[Run]", counts: dict[str, int], store: "Store") -> int:
         from contourslam.experiments.sweep.cost import expected_seconds

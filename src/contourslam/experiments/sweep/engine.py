@@ -7,13 +7,14 @@ import os
 import secrets
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from contourslam.errors import ConfigError, ContourslamError
 from contourslam.evaluation.extras import require
 from contourslam.experiments.parallel import Observer
+from contourslam.experiments.sweep.reach import no_scheduler, reach
 from contourslam.experiments.sweep.rows import DONE, FAILED
 from contourslam.experiments.sweep.runs import Run
 from contourslam.experiments.sweep.store import Store
@@ -22,6 +23,7 @@ from contourslam.experiments.sweep.versions import program
 
 _POLL = 0.2  # s
 _PATIENCE = 30.0  # s until a worker or a scheduler is there
+_LOOK = 5.0  # s between looks at whether there are workers
 _NO_PROGRESS = 5  # times a task is sent again without any run of it having been begun
 _LOST = "the scheduler is gone; what is done is kept, and the same command goes on from there"
 _PRELOAD = "contourslam.experiments.sweep.tasks"
@@ -52,6 +54,7 @@ def sweep(
     jobs: int = 0,
     scheduler: str | None = None,
     observer: Observer | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Outcome:
     """Do runs, each row kept as soon as it is there; afterwards the rows are one table.
 
@@ -67,6 +70,8 @@ def sweep(
         Address of a Dask scheduler whose workers are to do it in place of these.
     observer : Observer, optional
         Told the runs that are over, and may stop the sweep.
+    say : callable
+        Told what people should know of the workers.
 
     Returns
     -------
@@ -83,20 +88,26 @@ def sweep(
         return Outcome(0, 0, True)
     if store.url.startswith("memory:"):
         raise ConfigError(f"{store.url} is seen by one process alone; choose a folder or an object store")
+    observer = observer or Observer()
+    if scheduler is not None:
+        say(f"connecting to {scheduler}")
+        if not reach(scheduler, _PATIENCE, observer.stopped):
+            return Outcome(0, 0, False)
     with _client(min(jobs or _cores(), len(runs)), scheduler) as client:
         threads = _check_workers(client, scheduler)
-        return _Session(client, store, observer or Observer()).do(pieces(runs, threads))
+        return _Session(client, store, observer, say).do(pieces(runs, threads))
 
 
 class _Session:
     """One sweep's conversation with the scheduler."""
 
-    def __init__(self, client: Any, store: Store, observer: Observer) -> None:
-        self._client, self._store, self._observer = client, store, observer
+    def __init__(self, client: Any, store: Store, observer: Observer, say: Callable[[str], None]) -> None:
+        self._client, self._store, self._observer, self._say = client, store, observer, say
         self._name = secrets.token_hex(6)
         self._over: dict[str, str] = {}
         self._woken = threading.Event()
         self._sent = 0
+        self._manned, self._look = True, time.monotonic() + _LOOK
 
     def do(self, todo: list[tuple[Run, ...]]) -> Outcome:
         """Have all pieces done, or as many as there are until it is stopped."""
@@ -119,6 +130,7 @@ class _Session:
                     if idle > _NO_PROGRESS:
                         raise ContourslamError("the workers die before they begin; look at their logs")
                     waiting[self._submit(rest)] = rest, idle
+            self._look_for_workers()
             if len(self._over) != shown:
                 shown = len(self._over)
                 self._observer.progress(shown, total)
@@ -131,6 +143,19 @@ class _Session:
         future = self._client.submit(do_task, task, key=f"contourslam-sweep-{self._name}-{self._sent}", pure=False)
         future.add_done_callback(lambda _: self._woken.set())
         return future
+
+    def _look_for_workers(self) -> None:
+        """Say once that nobody is there to work, and once that somebody is again."""
+        if time.monotonic() < self._look:
+            return
+        self._look = time.monotonic() + _LOOK
+        try:
+            there = bool(self._client.sync(self._client.scheduler.ncores, callback_timeout=_LOOK))
+        except (OSError, RuntimeError):  # of a scheduler that is gone, the futures tell
+            return
+        if there != self._manned:
+            self._manned = there
+            self._say("workers are there again" if there else "no worker is left; waiting for one to come")
 
     def _tell_stop(self) -> None:
         try:
@@ -173,10 +198,8 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
     if scheduler is not None:
         try:
             client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
-        except (OSError, ValueError) as error:  # a time-out is an OSError
-            raise ContourslamError(
-                f"no Dask scheduler answers at {scheduler} ({error}); start one with `dask scheduler`"
-            ) from error
+        except Exception as error:
+            raise no_scheduler(scheduler, error) from error
         try:
             yield client
         finally:
