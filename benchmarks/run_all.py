@@ -8,7 +8,15 @@ from pathlib import Path
 # The filter's matrices are small: threads of the linear algebra would measure the machine's load, not the code.
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 # Too long to be part of all, at real time, or in an environment of its own: `make bench-scale` and the others.
-ON_THEIR_OWN = {"bench_scale", "bench_ros", "bench_robot", "bench_joining", "bench_fleet", "bench_fleet_wire", "bench_sweep"}
+ON_THEIR_OWN = {
+    "bench_scale",
+    "bench_ros",
+    "bench_robot",
+    "bench_joining",
+    "bench_fleet",
+    "bench_fleet_wire",
+    "bench_sweep",
+}
 
 
 def main() -> int:

@@ -88,7 +88,7 @@ def test_silence_is_told(device: PluggedX4) -> None:
 
 def test_a_lidar_that_answers_but_never_sends_a_sample_is_told(device: PluggedX4) -> None:
     device.lidar.silent = True
-    with lidar_at(device, timeout=0.2) as lidar, pytest.raises(DeviceSilentError, match="no data"):
+    with lidar_at(device, timeout=0.5) as lidar, pytest.raises(DeviceSilentError, match="no data"):
         next(lidar.scans())
     assert device.lidar.commands.count(0x60) == 4
 
