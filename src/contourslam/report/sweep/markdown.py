@@ -106,7 +106,7 @@ def _item(item: Item, stem: str) -> str:
         case Heading(text):
             return f"**{text}**"
         case Code(text, language):
-            return f"```{language or 'text'}\n{text}\n```"
+            return f"```{language}\n{text}\n```" if language else f"`{text}`"
         case Table(_, caption, headers, rows):
             lines = [headers, ["---"] * len(headers)]
             lines += [[f"*{row.name}*" if row.aside else row.name, *map(_cell, row.cells)] for row in rows]
