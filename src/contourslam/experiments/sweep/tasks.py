@@ -20,8 +20,7 @@ TRIES = 3
 """How often a run may end its worker before it counts as failed."""
 TOPIC = "contourslam-sweep"
 """What workers tell of the runs that are over."""
-_PIECES = 8  # per process, at least: else the last ones leave the others idle
-_LONGEST = 60  # runs
+_PIECES = 4  # per process, at least: else the last ones leave the others idle
 
 _stopped: set[str] = set()
 
@@ -52,7 +51,9 @@ class Task:
 
 
 def pieces(runs: Sequence[Run], processes: int) -> list[tuple[Run, ...]]:
-    """Cut runs into pieces, each of one drive, several for each process.
+    """Make the runs of each drive a piece of work, or several where the drives are too few to keep all processes busy.
+
+    A drive that is cut is simulated, or read, by each process that gets a part of it.
 
     Parameters
     ----------
@@ -64,11 +65,11 @@ def pieces(runs: Sequence[Run], processes: int) -> list[tuple[Run, ...]]:
     -------
     list of tuple of Run
     """
-    longest = min(max(len(runs) // (_PIECES * processes), 1), _LONGEST)
+    drives = [sorted(group, key=lambda run: run.order) for _, group in groupby(runs, key=lambda run: run.drive.shared)]
+    wanted = -(-_PIECES * processes // max(len(drives), 1))
     cut: list[tuple[Run, ...]] = []
-    for _, group in groupby(runs, key=lambda run: run.drive.shared):
-        together = sorted(group, key=lambda run: run.order)
-        count = -(-len(together) // longest)
+    for together in drives:
+        count = min(wanted, len(together))
         bounds = [round(i * len(together) / count) for i in range(count + 1)]
         cut += [tuple(together[a:b]) for a, b in pairwise(bounds)]
     return cut
