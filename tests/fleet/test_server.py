@@ -14,7 +14,8 @@ from contourslam.evaluation.fleet import fit, rmse
 from contourslam.fleet.facts import Answer
 from contourslam.fleet.inbox import Inbox
 from contourslam.fleet.reporter import Reporter
-from contourslam.fleet.server import FleetServer, Shared
+from contourslam.fleet.server import FleetServer
+from contourslam.fleet.shared import Shared
 from contourslam.geometry.poses import interpolate
 from contourslam.graph import GraphSlam
 from contourslam.scan import LaserScan, Odometry, TruePose

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from contourslam.cli.run import DEFAULTS
 from contourslam.errors import MessageError
 from contourslam.fleet.facts import Fact, KeyframeFact, RelationFact, Report, Status, StretchFact
+from contourslam.fleet.inbox import MOST_SILENT
 from contourslam.fleet.reporter import Reporter
-from contourslam.fleet.server import MOST_SILENT, FleetServer
+from contourslam.fleet.server import FleetServer
 from contourslam.fleet.wire import encode
 from contourslam.graph import GraphSlam
 from contourslam.graph.keeping import kept, resume

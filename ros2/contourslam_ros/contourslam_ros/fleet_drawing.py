@@ -10,7 +10,7 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from contourslam.fleet.server import Shared
+from contourslam.fleet.shared import Shared
 from contourslam_ros.markers import WALL, Colour, map_markers, marker
 from contourslam_ros.messages import header, quaternion
 

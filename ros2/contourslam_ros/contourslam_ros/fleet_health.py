@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from contourslam.fleet.common import Joined
 from contourslam.fleet.facts import Answer
-from contourslam.fleet.server import Fault
+from contourslam.fleet.faults import Fault
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam.live.figures import Rate
 

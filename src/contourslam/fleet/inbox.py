@@ -15,6 +15,7 @@ Source = tuple[str, int]  # robot and run
 
 AHEAD, AHEAD_BYTES = 256, 1 << 20  # reports of a run, and bytes of them, that are held beyond a gap
 ASKED = 32  # missing reports that an answer names
+MOST_SILENT = 1000  # runs that say that they are there, and of which no report has come
 TURNS = 8  # times that runs of one name went on after each other, from which on two robots share the name
 
 
@@ -77,6 +78,7 @@ class Inbox:
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder
         self._shelves: dict[Source, _Shelf] = {}
+        self._silent: set[Source] = set()  # of which no report has come
         self._turns: dict[str, tuple[int, int]] = {}  # run of each robot that went on last, and how often others did
         self.troubles: list[str] = []
         self._journals = 0  # numbers given to files
@@ -135,10 +137,13 @@ class Inbox:
         message = decode(data)
         source = message.robot, message.run
         if isinstance(message, Status):
+            if source not in self._shelves and len(self._silent) >= MOST_SILENT:
+                return Taken(source, fault=f"more than {MOST_SILENT} runs have told nothing; this one is not heard")
             return Taken(source, status=message, fault=self._hear(message))
         if not isinstance(message, Report):
             return Taken(source, fault="an answer, which only a server sends; are there two?")
         shelf = self._shelf(source)
+        self._silent.discard(source)
         number = message.number
         before = self._checksum(shelf, number)
         if before is not None:
@@ -221,6 +226,7 @@ class Inbox:
         shelf = self._shelves.get(source)
         if shelf is None:
             shelf = self._shelves[source] = _Shelf(None)
+            self._silent.add(source)
         return shelf
 
     def _hear(self, status: Status) -> str:

@@ -12,9 +12,11 @@ from contourslam.config import Config
 from contourslam.fleet.channel import Air
 from contourslam.fleet.common import Joined
 from contourslam.fleet.facts import Answer
+from contourslam.fleet.faults import Fault
 from contourslam.fleet.inbox import Inbox
 from contourslam.fleet.play_robot import Message, Played, Player, Robot
-from contourslam.fleet.server import Fault, FleetServer, Shared
+from contourslam.fleet.server import FleetServer
+from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import encode
 
 TICK, ANSWER = 0.5, 1.0  # s between two rounds of the server's work, and between two answers

@@ -10,7 +10,7 @@ from contourslam.contour.contours import Floats
 from contourslam.fleet.channel import Air, Channel
 from contourslam.fleet.facts import Answer
 from contourslam.fleet.reporter import Reporter
-from contourslam.fleet.server import Shared
+from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import decode
 from contourslam.geometry.poses import between_one, compose, interpolate
 from contourslam.graph.slam import GraphSlam

@@ -10,72 +10,21 @@ from time import perf_counter
 import numpy as np
 
 from contourslam.config import Config
-from contourslam.contour.contours import Floats, Ints
+from contourslam.contour.contours import Floats
 from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
 from contourslam.fleet.facts import Answer, KeyframeFact, Report
+from contourslam.fleet.faults import Fault, Faults, briefly
 from contourslam.fleet.inbox import Inbox, Source
 from contourslam.fleet.joints_kept import KeptJoint, Owner, keep_joint, kept_joints
 from contourslam.fleet.runs import Identity, Run
 from contourslam.fleet.server_search import Search
-from contourslam.fleet.wire import decode
+from contourslam.fleet.shared import Shared, share
 from contourslam.joining.joint import Joint
-from contourslam.maps.saved_map import SavedMap
 
 LATEST = 1.0  # s after which keyframes that wait enter the graph, however few
 GROWN = 1.5  # a common map that has grown so much since it was last solved as a whole is solved again
 FEWEST = 60  # keyframes of a common map that is worth it
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """Something that a robot told and that cannot be used, or that was wrong with what was kept.
-
-    Attributes
-    ----------
-    robot : str
-        Empty for what was kept.
-    run : int
-    text : str
-        What, and what was done about it.
-    """
-
-    robot: str
-    run: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Shared:
-    """A common map, as it is given away.
-
-    Attributes
-    ----------
-    number : int
-    members : tuple of (str, int)
-        Robot and run, in the order of the map's keyframes.
-    counts : tuple of int
-        Keyframes that each of them added.
-    saved : SavedMap
-    joined : tuple of Joined
-        How it came about, and on which evidence.
-    rows : tuple of ndarray of int
-        Of each of them, where all its keyframes are in the map: one that began in a map that was kept shares those with
-        the run before.
-    """
-
-    number: int
-    members: tuple[Source, ...]
-    counts: tuple[int, ...]
-    saved: SavedMap
-    joined: tuple[Joined, ...]
-    rows: tuple[Ints, ...]
-
-    def frames(self) -> Iterator[tuple[Source, Floats]]:
-        """Give the runs and the poses of their keyframes, each of shape (k, 3)."""
-        if self.saved.keyframes is not None:
-            for source, rows in zip(self.members, self.rows, strict=True):
-                yield source, self.saved.keyframes.poses[rows]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +39,6 @@ class _Placed:
 
 
 NOWHERE = _Placed(-1, (), -1, np.zeros(3), np.zeros((3, 3)))
-MOST_FAULTS = 1000
-MOST_SILENT = 1000  # runs that say that they are there, and of which no report has come
 
 
 class FleetServer:
@@ -134,8 +81,9 @@ class FleetServer:
         self._clock = clock
         self._lock = threading.Lock()  # held for moments; what follows is changed under it
         self._fresh: deque[Report] = deque(self._inbox.kept())
-        self._told, self._silent = set(self._inbox.sources), set[Source]()  # runs of which reports have come, and not
-        self._faults: dict[Fault, None] = {Fault("", 0, trouble): None for trouble in self._inbox.troubles}
+        self._faults = Faults()
+        for trouble in self._inbox.troubles:
+            self._faults.note(trouble)
         self._placed: dict[Source, _Placed] = {}
         # All that follows is touched by the thread that ticks alone.
         self._commons: dict[int, CommonMap] = {}
@@ -170,37 +118,11 @@ class FleetServer:
             If it cannot be kept; it is not taken then, and the robot will send it again.
         """
         with self._lock:
-            stranger = self._stranger(data)
-            if stranger is not None:
-                return stranger
             taken = self._inbox.take(data)
-            if taken.reports:
-                self._told.add(taken.source)
-                self._silent.discard(taken.source)
             self._fresh.extend(taken.reports)
-            if taken.fault:
-                self._note(Fault(*taken.source, taken.fault))
+        if taken.fault:
+            self._faults.note(taken.fault, *taken.source)
         return taken.source
-
-    def _stranger(self, data: bytes) -> Source | None:
-        """Give the source of a status that is one too many of runs that have told nothing yet."""
-        if data[3:4] != b"S":
-            return None
-        message = decode(data)
-        source = message.robot, message.run
-        if source in self._silent or source in self._told:
-            return None
-        if len(self._silent) < MOST_SILENT:
-            self._silent.add(source)
-            return None
-        self._note(Fault(*source, f"more than {MOST_SILENT} runs have told nothing; this one is not heard"))
-        return source
-
-    def _note(self, fault: Fault) -> None:
-        self._faults.pop(fault, None)
-        self._faults[fault] = None
-        if len(self._faults) > MOST_FAULTS:
-            del self._faults[next(iter(self._faults))]
 
     def tick(self, now: float, budget: float | None = None) -> None:
         """Do what is to be done: place new keyframes, look for joints, solve whole maps anew.
@@ -262,8 +184,7 @@ class FleetServer:
             self._since.setdefault(self._where[run].number, now)
 
     def _tell(self, run: Run, text: str) -> None:
-        with self._lock:
-            self._note(Fault(run.robot, run.number, text))
+        self._faults.note(text, run.robot, run.number)
 
     def _recognise(self, run: Run) -> None:
         """Let a run that began in a map that was kept share the common map of the run that the map is from."""
@@ -291,9 +212,8 @@ class FleetServer:
 
     def _put_aside(self, common: CommonMap, error: Exception) -> None:
         """Give up a common map that cannot be solved; what its runs tell is kept, and not used any more."""
-        text = " ".join(str(error).split())[:200]
         for run in common.runs:
-            self._tell(run, f"common map {common.number} cannot be solved ({text}); its runs are put aside")
+            self._tell(run, f"common map {common.number} cannot be solved ({briefly(error)}); its runs are put aside")
             self._aside.add((run.robot, run.number))
             del self._where[run]
         common.runs = []
@@ -309,7 +229,7 @@ class FleetServer:
             try:
                 yield from kept_joints(self._inbox.folder)
             except OSError as error:
-                self._note(Fault("", 0, f"the joints that were kept cannot be read ({error}); they are looked for"))
+                self._faults.note(f"the joints that were kept cannot be read ({error}); they are looked for")
 
     def _join_again(self) -> None:
         """Join what was joined before this process began."""
@@ -351,10 +271,7 @@ class FleetServer:
             try:
                 keep_joint(self._inbox.folder, kept)
             except OSError as error:
-                with self._lock:
-                    self._note(
-                        Fault("", 0, f"a joint cannot be kept ({error}); it is looked for again after a restart")
-                    )
+                self._faults.note(f"a joint cannot be kept ({error}); it is looked for again after a restart")
         del self._commons[younger.number]
         for run in younger.runs:
             self._where[run] = older
@@ -367,9 +284,7 @@ class FleetServer:
         try:
             return self.search.step(self._where)
         except Exception as error:
-            text = " ".join(str(error).split())[:200]
-            with self._lock:
-                self._note(Fault("", 0, f"a view cannot be looked for ({text}); it is left out"))
+            self._faults.note(f"a view cannot be looked for ({briefly(error)}); it is left out")
             return None
 
     def _solve_one(self) -> None:
@@ -396,12 +311,12 @@ class FleetServer:
         try:
             better = refined(saved, self._config)
         except Exception as error:
-            text = " ".join(str(error).split())[:200]
-            self._tell(common.runs[0], f"common map {number} cannot be solved as a whole ({text}); it stays as it is")
-            return _shared(common, saved)
+            why = f"common map {number} cannot be solved as a whole ({briefly(error)}); it stays as it is"
+            self._tell(common.runs[0], why)
+            return share(common, saved)
         common.begin_anew(better, order)
         self.search.moved(common)
-        return _shared(common, better)
+        return share(common, better)
 
     def _place(self) -> None:
         """Let the answers know where each run is now."""
@@ -452,25 +367,15 @@ class FleetServer:
 
     def faults(self) -> tuple[Fault, ...]:
         """Give what could not be used, the newest last, from any thread."""
-        with self._lock:
-            return tuple(self._faults)
+        return self._faults.all()
 
     def common_maps(self) -> tuple[Shared, ...]:
         """Give all common maps as they stand, the oldest first; in the thread that ticks."""
-        return tuple(_shared(common, common.kept()[0]) for common in self._commons.values() if len(common))
+        return tuple(share(common, common.kept()[0]) for common in self._commons.values() if len(common))
 
     def settle(self) -> tuple[Shared, ...]:
         """Solve all common maps as a whole, and give them; in the thread that ticks."""
         return tuple(self.solve(common.number) for common in list(self._commons.values()) if len(common))
-
-
-def _shared(common: CommonMap, saved: SavedMap) -> Shared:
-    runs = [run for run in common.runs if run.keys]
-    members = tuple((run.robot, run.number) for run in runs)
-    index = np.empty(len(common), np.int64)
-    index[[run.keys[number] for run in runs for number in run.own]] = np.arange(len(common))
-    rows = tuple(index[run.keys] for run in runs)
-    return Shared(common.number, members, tuple(len(run.own) for run in runs), saved, common.joined, rows)
 
 
 def _owners(older: CommonMap, younger: CommonMap, joint: Joint) -> Iterator[tuple[Owner, ...]]:

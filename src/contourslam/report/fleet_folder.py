@@ -11,7 +11,7 @@ import numpy as np
 from contourslam import __version__
 from contourslam.atomic import make_folder, remove, write_text
 from contourslam.fleet.play import Fleet
-from contourslam.fleet.server import Shared
+from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import NAME
 from contourslam.maps import save_map
 from contourslam.recordings import write_trajectory

@@ -12,7 +12,7 @@ from contourslam.evaluation.fleet import fit, met, rmse
 from contourslam.fleet.common import Joined
 from contourslam.fleet.play import Fleet
 from contourslam.fleet.play_robot import Played
-from contourslam.fleet.server import Shared
+from contourslam.fleet.shared import Shared
 from contourslam.geometry.poses import between, compose
 
 
