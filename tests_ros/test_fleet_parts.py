@@ -1,8 +1,11 @@
 """Parts of the fleet's nodes by themselves: any robot's name, threads that meet, a full disk, what cannot be told."""
 
+import json
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,11 +21,13 @@ from contourslam.fleet.facts import Answer
 from contourslam.graph.slam import GraphSlam
 from contourslam.live.diagnostics import Diagnostic, Level
 from contourslam_ros import fleet_link
+from contourslam_ros import slam as slam_node
 from contourslam_ros.fleet_health import FleetHealth, State, Voice
 from contourslam_ros.fleet_link import FleetLink
 from contourslam_ros.fleet_maps import FleetMaps
 from contourslam_ros.fleet_settings import FleetConfig
 from contourslam_ros.fleet_topics import answers_to, in_topic
+from contourslam_ros.live_node import LiveNode
 from contourslam_ros.settings import NodeConfig
 
 FOREIGN = "robot-1", "1a", "a.b", "9-.-9", "x" * 64
@@ -122,6 +127,23 @@ def test_sites_are_read_and_what_names_none_is_refused() -> None:
     for wrong in ("robot1", "robot1:", ":ground", "robot 1:ground", "robot1:ground,robot1:first"):
         with pytest.raises(ConfigError, match="parameter sites"):
             FleetConfig(sites=wrong)
+
+
+def test_what_tells_a_fleet_is_compiled_before_the_robot_maps() -> None:
+    program = Path(__file__).with_name("fleet_rehearsed.py")
+    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == []
+
+
+@pytest.mark.parametrize("link", [None, "a link"])
+def test_a_robot_rehearses_for_a_fleet_where_there_is_one(link: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    rehearsed: list[Config] = []
+    monkeypatch.setattr(LiveNode, "warm_up", lambda node: None)
+    monkeypatch.setattr(slam_node, "rehearse_robot", rehearsed.append)
+    robot: Any = slam_node.Slam.__new__(slam_node.Slam)
+    robot.link, robot.settings = link, SimpleNamespace(core=Config())
+    robot.warm_up()
+    assert rehearsed == [Config()] * (link is not None)
 
 
 class Unsendable:

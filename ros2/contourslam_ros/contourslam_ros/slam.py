@@ -10,6 +10,7 @@ from contourslam.errors import ConfigError
 from contourslam.live.session import Session
 from contourslam.live.start import mapping
 from contourslam_ros.fleet_link import FleetLink
+from contourslam_ros.fleet_rehearsal import rehearse_robot
 from contourslam_ros.live_node import LiveNode
 from contourslam_ros.running import run
 
@@ -25,6 +26,12 @@ class Slam(LiveNode):
             if self.settings.core.back_end != "graph":
                 raise ConfigError("a fleet is told keyframes, which only the graph has; set back_end to graph")
             self.link = FleetLink(self, self.config, self.settings.live)
+
+    def warm_up(self) -> None:
+        """Have what tells a fleet compiled too: it works in the mapping's thread."""
+        super().warm_up()
+        if self.link is not None:
+            rehearse_robot(self.settings.core)
 
     def begin(self, mount: np.ndarray) -> Session:
         """Map anew, or continue the map that is there."""
