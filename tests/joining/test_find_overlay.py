@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from contourslam.geometry.poses import transform
 from contourslam.joining.chart import Chart
-from contourslam.joining.overlay import LOOK_ALIKE, SQUARE, TOUCHES, Overlay, Surfaces, squares_of
+from contourslam.joining.overlay import LOOK_ALIKE, SQUARE, TOUCHES, Overlay, Surfaces
 from contourslam.localization.free_space import CELL
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.cell_map import nearest
+from contourslam.matching.squares import squares_of
 
 Floats = NDArray[np.float64]
 

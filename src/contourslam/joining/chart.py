@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from contourslam.contour.contours import Floats, Ints
 from contourslam.errors import MapError
 from contourslam.geometry.poses import between, compose, inverse, transform
-from contourslam.joining.overlay import Surfaces, numbered, squares_of, surfaces_of
-from contourslam.localization.known_map import KnownMap
+from contourslam.joining.overlay import Surfaces, surfaces_of
+from contourslam.localization.known_map import KnownMap, landmarks_of
 from contourslam.localization.view import View, view_of
 from contourslam.maps.saved_map import Contoured, SavedMap
 from contourslam.matching.cell_map import CellMap
 from contourslam.matching.certainty import Hold, hold
 from contourslam.matching.constellation import Constellation
 from contourslam.matching.oriented import move
+from contourslam.matching.squares import numbered, squares_of
 
 WAY = 8.0  # m of the drive that one view is from
 SEEN_FROM = 15.0  # m; landmarks and contours farther from the middle of a view are left to other views
@@ -94,10 +95,7 @@ class Chart:
     @cached_property
     def landmarks(self) -> Constellation:
         """All its corners and walls."""
-        corners, walls = self.saved.corners, self.saved.walls
-        return Constellation(
-            corners.positions, corners.directions, corners.openings, corners.convex, walls.normals, walls.end_points
-        )
+        return landmarks_of(self.saved)
 
     @cached_property
     def surfaces(self) -> Surfaces:

@@ -14,6 +14,7 @@ from contourslam.localization.free_space import CELL, FreeSpace, see_free
 from contourslam.maps.saved_map import Contoured
 from contourslam.matching.cell_map import CellMap, Tiles, nearest
 from contourslam.matching.oriented import move
+from contourslam.matching.squares import averaged
 
 SQUARE = 0.2  # m; the surfaces of one square that look the same way count once
 FARTHEST = 10.0  # m; what a keyframe saw beyond this counts neither for nor against: its heading is known too badly
@@ -112,32 +113,12 @@ def surfaces_of(frames: Contoured, keyframes: Ints, poses: Floats) -> Surfaces:
     starts = np.cumsum([0, *map(len, contours)])
     seen = np.concatenate([np.empty((0, 4)), *contours]).astype(np.float32)
     clear = _clear(see_free(poses, starts, seen, low, high))
-    points = _averaged(points)
+    points = averaged(points, SQUARE)
     cells = CellMap(0.5 * (low + high), 0.5 * float((high - low).max()), large=True)
     cells.insert(points, np.zeros(3))
     at = np.floor((points[:, :2] - (clear.x0, clear.y0)) / CELL).astype(np.int64)
     # What the map itself saw through has come or gone: it proves nothing where it is, and nothing where it is not.
     return Surfaces(np.ascontiguousarray(points[~clear.free[at[:, 1], at[:, 0]]]), cells, clear)
-
-
-def numbered(squares: Floats) -> Ints:
-    """One number for each square of a grid, given by two whole numbers in the last axis."""
-    return np.asarray(squares[..., 0].astype(np.int64) << 32 | squares[..., 1].astype(np.int64) & 0xFFFFFFFF)
-
-
-def squares_of(points: Floats, size: float) -> Ints:
-    """The square of the plane, of `size` (m), that each contour point lies in, and which of eight ways it looks."""
-    octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5).astype(np.int64) % 8
-    return numbered(np.floor(points[:, :2] / size)) * 8 + octants
-
-
-def _averaged(points: Floats) -> Floats:
-    """One point for each square and direction."""
-    _, which, count = np.unique(squares_of(points, SQUARE), return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(which.reshape(-1), points[:, c], len(count)) for c in range(4)], axis=1)
-    out = sums / count[:, None]
-    out[:, 2:] /= np.maximum(np.hypot(out[:, 2], out[:, 3]), 1e-9)[:, None]
-    return np.ascontiguousarray(out)
 
 
 def _clear(seen: FreeSpace) -> FreeSpace:

@@ -14,6 +14,7 @@ from contourslam.matching.cell_map import CellMap
 from contourslam.matching.constellation import Constellation
 from contourslam.matching.oriented import move
 from contourslam.matching.search_grid import SearchGrid, build_search_grid
+from contourslam.matching.squares import averaged
 
 MERGED = 0.05  # m; points of one cell of this size that look the same way are one
 SEARCH_CELLS = (0.1, 0.2, 0.4)  # m; the first that the tables hold the map at
@@ -50,16 +51,13 @@ class KnownMap:
     """
 
     def __init__(self, saved: SavedMap) -> None:
-        corners, walls = saved.corners, saved.walls
-        self.landmarks = Constellation(
-            corners.positions, corners.directions, corners.openings, corners.convex, walls.normals, walls.end_points
-        )
+        self.landmarks = landmarks_of(saved)
         frames = saved.keyframes
         self.free: FreeSpace | None = None
         if frames is not None and len(frames):
-            self.points = _merged(_in_the_map(frames))
+            self.points = averaged(_in_the_map(frames), MERGED)
         else:
-            self.points = _merged(_drawn(self.landmarks))
+            self.points = averaged(_drawn(self.landmarks), MERGED)
         if not len(self.points):
             raise MapError("the map holds no contours, corners or walls: there is nothing to localise in")
         low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
@@ -96,20 +94,18 @@ class KnownMap:
         return cells
 
 
+def landmarks_of(saved: SavedMap) -> Constellation:
+    """All corners and walls of a map."""
+    corners, walls = saved.corners, saved.walls
+    return Constellation(
+        corners.positions, corners.directions, corners.openings, corners.convex, walls.normals, walls.end_points
+    )
+
+
 def _in_the_map(frames: Contoured) -> Floats:
-    return np.concatenate([move(frames.contour(k).astype(np.float64), pose) for k, pose in enumerate(frames.poses)])
-
-
-def _merged(points: Floats) -> Floats:
-    """Average the points of each cell that look the same way."""
-    points = points[np.isfinite(points).all(axis=1)]
-    octants = np.floor(np.arctan2(points[:, 3], points[:, 2]) * (4.0 / np.pi) + 0.5) % 8
-    keys = np.column_stack([np.floor(points[:, :2] / MERGED), octants]).astype(np.int64)
-    _, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(which.reshape(-1), points[:, c], len(count)) for c in range(4)], axis=1)
-    out = sums / np.maximum(count, 1)[:, None]
-    out[:, 2:] /= np.maximum(np.hypot(out[:, 2], out[:, 3]), 1e-9)[:, None]
-    return out
+    contours = [move(frames.contour(k).astype(np.float64), pose) for k, pose in enumerate(frames.poses)]
+    points = np.concatenate(contours)
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def _drawn(landmarks: Constellation) -> Floats:
