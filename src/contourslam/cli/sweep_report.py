@@ -37,6 +37,7 @@ class SweepReport:
         from contourslam.report.sweep.markdown import check_place, write_markdown
         from contourslam.report.sweep.measures import COMPARABLE, MEASURES
         from contourslam.report.sweep.page import write_sweep_report
+        from contourslam.report.sweep.parts import Parts
         from contourslam.report.sweep.reading import read_sweep
 
         choices = {name: MEASURES[name] for name in COMPARABLE}
@@ -46,9 +47,10 @@ class SweepReport:
             check_place(self.markdown)
         sweep = read_sweep(self.results)
         prepare_folder(self.output, overwrite=self.overwrite)
-        metrics = write_sweep_report(self.output, sweep, measures, command=command)
+        parts = Parts(sweep, measures, command)
+        metrics = write_sweep_report(self.output, parts)
         if self.markdown is not None:
-            write_markdown(self.markdown, sweep, measures, command=command)
+            write_markdown(self.markdown, parts)
         if self.json:
             print_json(metrics)
         else:

@@ -8,6 +8,7 @@ import pytest
 
 from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.page import write_sweep_report
+from contourslam.report.sweep.parts import Parts
 from contourslam.report.sweep.reading import sweep_of
 
 pytest.importorskip("scipy")
@@ -16,9 +17,8 @@ pytest.importorskip("scipy")
 @pytest.fixture
 def page(sweep_rows: Callable[..., Any], log_rows: list[dict[str, Any]], tmp_path: Path) -> Path:
     sweep = sweep_of([*sweep_rows((0.8, 1.0, 1.0, 1.0), failed=[("wu", 0)]), *log_rows], ["name = 'a'"])
-    write_sweep_report(
-        tmp_path, sweep, [MEASURES["position"], MEASURES["false_negatives"]], command="contourslam sweep-report a -o b"
-    )
+    measures = [MEASURES["position"], MEASURES["false_negatives"]]
+    write_sweep_report(tmp_path, Parts(sweep, measures, "contourslam sweep-report a -o b"))
     return tmp_path / "index.html"
 
 

@@ -10,6 +10,7 @@ from contourslam.errors import ResultError
 from contourslam.report.sweep.markdown import write_markdown
 from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.page import write_sweep_report
+from contourslam.report.sweep.parts import Parts
 from contourslam.report.sweep.reading import sweep_of
 
 pytest.importorskip("scipy")
@@ -22,7 +23,7 @@ def report(tmp_path_factory: pytest.TempPathFactory, sweep_rows, log_rows) -> Pa
     folder = tmp_path_factory.mktemp("report")
     rows = sweep_rows((0.8, 1.0, 1.0, 1.0), seeds=16, failed=[("matched_filter", 3)])
     sweep = sweep_of([*rows, *log_rows], ["name = 'of & tests'"], expected=len(rows) + len(log_rows) + 7)
-    write_sweep_report(folder, sweep, POSITION, command="contourslam sweep-report out/sweep -o out/report")
+    write_sweep_report(folder, Parts(sweep, POSITION, "contourslam sweep-report out/sweep -o out/report"))
     return folder
 
 
@@ -74,22 +75,22 @@ def test_a_new_report_leaves_nothing_of_an_old_one(report: Path, sweep_rows, tmp
     for name in ("tables/pairs_walls.csv", "figures/noise_walls_room.svg", "tables/mine.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("")
-    write_sweep_report(tmp_path, sweep_of(sweep_rows(seeds=2, conditions=[(0.01, 500)])), POSITION)
+    write_sweep_report(tmp_path, Parts(sweep_of(sweep_rows(seeds=2, conditions=[(0.01, 500)])), POSITION))
     left = {path.name for path in tmp_path.rglob("*") if path.is_file()}
     assert "mine.csv" in left and not {"pairs_walls.csv", "noise_walls_room.svg"} & left
 
 
 def test_few_drives_of_one_detector_are_reported_without_a_claim(sweep_rows, tmp_path: Path) -> None:
     rows = [row for row in sweep_rows(seeds=2, conditions=[(0.01, 500)]) if row["detector"] == "wu"]
-    metrics = write_sweep_report(tmp_path, sweep_of(rows), [MEASURES["heading"]])
+    metrics = write_sweep_report(tmp_path, Parts(sweep_of(rows), [MEASURES["heading"]]))
     assert all("better" not in line for line in metrics["findings"]["heading"])
-    two = write_sweep_report(tmp_path, sweep_of(sweep_rows(seeds=2)), POSITION)
+    two = write_sweep_report(tmp_path, Parts(sweep_of(sweep_rows(seeds=2)), POSITION))
     assert "Too few seeds to show anything" in two["findings"]["position"][1]
 
 
 def test_by_several_metrics_each_is_tested_and_the_first_is_drawn(sweep_rows, tmp_path: Path) -> None:
     measures = [MEASURES["false_negatives"], *POSITION]
-    metrics = write_sweep_report(tmp_path, sweep_of(sweep_rows((0.8, 1.0, 1.0, 1.0))), measures)
+    metrics = write_sweep_report(tmp_path, Parts(sweep_of(sweep_rows((0.8, 1.0, 1.0, 1.0))), measures))
     assert any("is better" in line for line in metrics["findings"]["position"])
     assert not any("is better" in line for line in metrics["findings"]["false_negatives"])
     page = (tmp_path / "index.html").read_text()
@@ -98,7 +99,7 @@ def test_by_several_metrics_each_is_tested_and_the_first_is_drawn(sweep_rows, tm
 
 
 def test_recordings_alone_are_reported(log_rows, tmp_path: Path) -> None:
-    metrics = write_sweep_report(tmp_path, sweep_of(log_rows), POSITION)
+    metrics = write_sweep_report(tmp_path, Parts(sweep_of(log_rows), POSITION))
     assert metrics["findings"] == {"position": []} and len(metrics["recordings"]) == 4
     assert "no interval, no test" in (tmp_path / "index.html").read_text()
 
@@ -110,25 +111,25 @@ def test_a_document_gets_the_report_in_its_places_and_keeps_its_words(sweep_rows
         "# Mine\n\n<!-- sweep:noise -->\nold\n<!-- /sweep:noise -->\n\nwords\n\n"
         "<!-- sweep:table-one -->\n<!-- /sweep:table-one -->\n"
     )
-    files = write_markdown(document, sweep, POSITION)
+    files = write_markdown(document, Parts(sweep, POSITION))
     text = document.read_text()
     assert text.startswith("# Mine\n") and "\nwords\n" in text and "\nold\n" not in text
     assert "| furnished room, Wu |" in text and "Every cell" not in text
     pictures = re.findall(r'src="(pictures/[^"]+)"', text)
     assert sorted(files) == sorted([document, *(tmp_path / name for name in pictures)]) and len(pictures) == 2
-    write_markdown(document, sweep, POSITION)
+    write_markdown(document, Parts(sweep, POSITION))
     assert document.read_text() == text
 
 
 def test_without_a_document_all_of_the_report_is_written(sweep_rows, log_rows, tmp_path: Path) -> None:
-    write_markdown(tmp_path / "new.md", sweep_of([*sweep_rows(), *log_rows]), POSITION, command="contourslam x")
+    write_markdown(tmp_path / "new.md", Parts(sweep_of([*sweep_rows(), *log_rows]), POSITION, "contourslam x"))
     titles = re.findall(r"^## (.*)", (tmp_path / "new.md").read_text(), re.MULTILINE)
     assert titles[:2] == ["In short", "What can be said"] and titles[-1] == "Reproduce this" and len(titles) == 10
 
 
 def test_a_place_for_what_was_not_run_says_so(log_rows, tmp_path: Path) -> None:
     (tmp_path / "a.md").write_text("<!-- sweep:noise -->\n<!-- /sweep:noise -->\n")
-    write_markdown(tmp_path / "a.md", sweep_of(log_rows), POSITION)
+    write_markdown(tmp_path / "a.md", Parts(sweep_of(log_rows), POSITION))
     assert "Nothing of this was run." in (tmp_path / "a.md").read_text()
 
 
@@ -136,8 +137,8 @@ def test_a_document_with_no_place_or_an_unknown_one_is_refused(sweep_rows, tmp_p
     document, sweep = tmp_path / "a.md", sweep_of(sweep_rows(seeds=1))
     document.write_text("# Nothing\n")
     with pytest.raises(ResultError, match="has no place"):
-        write_markdown(document, sweep, POSITION)
+        write_markdown(document, Parts(sweep, POSITION))
     document.write_text("<!-- sweep:noize -->\n<!-- /sweep:noize -->\n")
     with pytest.raises(ResultError, match="noize"):
-        write_markdown(document, sweep, POSITION)
+        write_markdown(document, Parts(sweep, POSITION))
     assert "noize" in document.read_text()

@@ -51,7 +51,7 @@ def test_equal_detectors_are_not_told_apart(sweep_rows) -> None:
 def test_failed_runs_are_counted_and_lose(sweep_rows) -> None:
     lost = [("wu", seed) for seed in range(11)]
     sweep = sweep_of(sweep_rows((1.0, 0.5, 1.0, 1.0), failed=lost))
-    cell = summary(sweep.cell("furnished_room", sweep.conditions("corners")[0], "wu"), POSITION)
+    cell = summary(sweep, POSITION, "furnished_room", sweep.conditions("corners")[0], "wu")
     assert (cell.runs, cell.failed, cell.interval.count) == (12, 11, 1)
     found = pairs(sweep, POSITION, [("", sweep.rooms)], sweep.conditions("corners"))
     assert ("wu", "") not in better(found) and ("matched_filter", "") in better(found)

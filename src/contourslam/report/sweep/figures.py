@@ -13,8 +13,8 @@ from contourslam.report.svg.axes import Axes
 from contourslam.report.svg.colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
 from contourslam.report.svg.drawing import Drawing, drawing
 from contourslam.report.sweep.measures import Measure
-from contourslam.report.sweep.statistics import Summary, summary, wheels
-from contourslam.report.sweep.values import Condition, Sweep
+from contourslam.report.sweep.statistics import summary, wheels
+from contourslam.report.sweep.values import Condition, Summary, Sweep
 
 Floats = NDArray[np.float64]
 AxisName = Literal["noise", "beams"]
@@ -64,9 +64,7 @@ def curves(sweep: Sweep, measure: Measure, room: str, setting: str, axis: AxisNa
         for one in sweep.conditions(setting, room)
         if getattr(one, other) == getattr(centre, other) and getattr(one, axis) is not None
     )
-    detectors = {
-        name: tuple(summary(sweep.cell(room, one, name), measure) for one in along) for name in sweep.detectors
-    }
+    detectors = {name: tuple(summary(sweep, measure, room, one, name) for one in along) for name in sweep.detectors}
     if len(along) < 2 or not any(one.known for found in detectors.values() for one in found):
         return None
     return Curves(axis, along, detectors, tuple(wheels(sweep, measure, room, one) for one in along))

@@ -14,9 +14,7 @@ from contourslam.errors import ResultError
 from contourslam.nearest import no_such, unreadable
 from contourslam.report.page.markup import Cell
 from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Part, Points, Table, Words
-from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.parts import Parts
-from contourslam.report.sweep.values import Sweep
 
 _PICTURES = "pictures"
 _PLACE = re.compile(r"<!-- sweep:([\w-]+) -->\n.*?<!-- /sweep:\1 -->", re.DOTALL)
@@ -40,16 +38,15 @@ def check_place(path: Path) -> None:
         raise ResultError(f"{path}: cannot be written ({error.strerror or error}); choose another file") from error
 
 
-def write_markdown(path: Path, sweep: Sweep, measures: Sequence[Measure], *, command: str = "") -> list[Path]:
+def write_markdown(path: Path, report: Parts) -> list[Path]:
     """Write the report into a Markdown file, and its figures into ``pictures/`` beside it.
 
     Parameters
     ----------
     path : Path
         A document with places for parts of the report, which are filled; where there is no file, all parts are written.
-    sweep : Sweep
-    measures : sequence of Measure
-    command : str
+    report : Parts
+        What it says.
 
     Returns
     -------
@@ -61,7 +58,7 @@ def write_markdown(path: Path, sweep: Sweep, measures: Sequence[Measure], *, com
     ResultError
         If the document has no place, or one for a part that there is none of, or a file cannot be read or written.
     """
-    parts = {part.anchor: part for part in Parts(sweep, measures, command).all()}
+    parts = {part.anchor: part for part in report.all()}
     whole = "\n\n".join(f"## {part.title}\n\n{_place(name, '')}" for name, part in parts.items() if part.items)
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else f"# Sweep of landmark detectors\n\n{whole}\n"

@@ -6,7 +6,6 @@ of a table under its name; and ``recordings`` with the figures of the real ones.
 """
 
 import re
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from contourslam.report.page.tables import to_csv, to_latex
 from contourslam.report.result_folder import to_json
 from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Points, Table, Words
 from contourslam.report.sweep.findings import counted
-from contourslam.report.sweep.measures import MEASURES, Measure
+from contourslam.report.sweep.measures import MEASURES
 from contourslam.report.sweep.parts import Parts
 from contourslam.report.sweep.statistics import Pair, summary
 from contourslam.report.sweep.values import Sweep
@@ -27,18 +26,15 @@ _OWN = re.compile(r"(findings|table_one|paper|cells|matrix|pairs|logs|failures|n
 """What an earlier report may have left in ``tables/`` and ``figures/``."""
 
 
-def write_sweep_report(folder: Path, sweep: Sweep, measures: Sequence[Measure], *, command: str = "") -> dict[str, Any]:
+def write_sweep_report(folder: Path, parts: Parts) -> dict[str, Any]:
     """Write ``index.html``, ``tables/``, ``figures/`` and ``metrics.json``.
 
     Parameters
     ----------
     folder : Path
         Made where needed. Tables and figures that an earlier report left here are removed; other files stay.
-    sweep : Sweep
-    measures : sequence of Measure
-        What detectors are compared by in simulated rooms; the first one is drawn.
-    command : str
-        The command line, shown as it stands.
+    parts : Parts
+        What it says.
 
     Returns
     -------
@@ -49,11 +45,8 @@ def write_sweep_report(folder: Path, sweep: Sweep, measures: Sequence[Measure], 
     ------
     ResultError
         If a file cannot be written.
-    MissingExtraError
-        If SciPy is not installed.
     """
-    parts = Parts(sweep, measures, command)
-    metrics = sweep_metrics(parts)
+    sweep, metrics = parts.sweep, sweep_metrics(parts)
     for name in ("tables", "figures"):
         make_folder(folder / name)
         for path in (folder / name).iterdir():
@@ -97,7 +90,11 @@ def sweep_metrics(parts: Parts) -> dict[str, Any]:
                 "detector": name,
                 "runs": len(runs),
                 "failed": sum(bool(run.error) for run in runs),
-                **{key: asdict(found.interval) for key, one in MEASURES.items() if (found := summary(runs, one)).known},
+                **{
+                    key: asdict(found.interval)
+                    for key, one in MEASURES.items()
+                    if (found := summary(sweep, one, room, condition, name)).known
+                },
             }
             for setting in sweep.settings
             for room in sweep.rooms

@@ -46,7 +46,12 @@ class Parts:
     measures : sequence of Measure
         What detectors are compared by in simulated rooms; the first one is drawn.
     command : str
-        The command line of the report.
+        The command line of the report, shown as it stands.
+
+    Raises
+    ------
+    MissingExtraError
+        If SciPy is not installed.
     """
 
     def __init__(self, sweep: Sweep, measures: Sequence[Measure], command: str = "") -> None:
@@ -117,7 +122,7 @@ class Parts:
         sweep, means = self.sweep, {}
         for setting in sweep.settings:
             if centre := sweep.centre(setting):
-                cells = {name: summary(sweep.cell(sweep.rooms[0], centre, name), measure) for name in sweep.detectors}
+                cells = {name: summary(sweep, measure, sweep.rooms[0], centre, name) for name in sweep.detectors}
                 means[setting] = {name: found.interval.mean for name, found in cells.items()}
         said = findings.beside_the_paper(means, sweep.rooms[0]) if means else None
         return [] if said is None else [said]

@@ -1,9 +1,10 @@
 """How sure a sweep's figures are: means of cells with their intervals, and detectors tested in pairs."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,30 +18,9 @@ from contourslam.evaluation.paired_tests import (
     signed_rank,
 )
 from contourslam.report.sweep.measures import Measure
-from contourslam.report.sweep.values import Condition, Drive, Sweep, SweepRun
+from contourslam.report.sweep.values import Condition, Drive, Summary, Sweep, SweepRun
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """A measure over the drives of a cell.
-
-    Attributes
-    ----------
-    interval : Interval
-        Over the drives that were finished and know the measure.
-    runs, failed : int
-    """
-
-    interval: Interval
-    runs: int
-    failed: int
-
-    @property
-    def known(self) -> bool:
-        """Whether there is anything to show."""
-        return self.interval.count > 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,30 +69,30 @@ Tests = dict[tuple[str, str], list[Pair]]
 """Pairs by the names of measure and setting."""
 
 
-def summary(runs: Iterable[SweepRun], measure: Measure, *, odometry: bool = False) -> Summary:
-    """Mean of a measure over runs, one a drive, with its interval.
-
-    Parameters
-    ----------
-    runs : iterable of SweepRun
-    measure : Measure
-    odometry : bool
-        Of the wheels alone.
-    """
-    found = list(runs)
-    value = measure.of_odometry if odometry else measure.of
-    values = np.array([math.nan if run.error else value(run.row) for run in found], dtype=np.float64)
-    return Summary(mean_interval(values), len(found), sum(bool(run.error) for run in found))
+def summary(sweep: Sweep, measure: Measure, place: str, condition: Condition, detector: str) -> Summary:
+    """Mean of a measure over the drives of a cell, with its interval; computed once."""
+    key = place, condition, detector, measure.name
+    if key not in sweep.summaries:
+        sweep.summaries[key] = _summary(sweep.cell(place, condition, detector), measure.of)
+    return sweep.summaries[key]
 
 
 def wheels(sweep: Sweep, measure: Measure, place: str, condition: Condition) -> Summary:
-    """Mean of the wheels alone over the drives of a place: each detector's run of a drive has the same wheels."""
-    drives: dict[Drive, SweepRun] = {}
-    for detector in sweep.detectors:
-        for run in sweep.cell(place, condition, detector):
-            if not run.error:
-                drives.setdefault(run.drive, run)
-    return summary(drives.values(), measure, odometry=True)
+    """The same of the wheels alone: each detector's run of a drive has the same wheels."""
+    key = place, condition, "", measure.name
+    if key not in sweep.summaries:
+        drives: dict[Drive, SweepRun] = {}
+        for detector in sweep.detectors:
+            for run in sweep.cell(place, condition, detector):
+                if not run.error:
+                    drives.setdefault(run.drive, run)
+        sweep.summaries[key] = _summary(list(drives.values()), measure.of_odometry)
+    return sweep.summaries[key]
+
+
+def _summary(runs: Sequence[SweepRun], value: Callable[[Mapping[str, Any]], float]) -> Summary:
+    values = np.array([math.nan if run.error else value(run.row) for run in runs], dtype=np.float64)
+    return Summary(mean_interval(values), len(runs), sum(bool(run.error) for run in runs))
 
 
 def pairs(

@@ -9,8 +9,8 @@ from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.content import Table
 from contourslam.report.sweep.findings import Comparison
 from contourslam.report.sweep.measures import MEASURES, TABLE_I, Measure
-from contourslam.report.sweep.statistics import Pair, Summary, Tests, summary, wheels
-from contourslam.report.sweep.values import Condition, Sweep
+from contourslam.report.sweep.statistics import Pair, Tests, summary, wheels
+from contourslam.report.sweep.values import Condition, Summary, Sweep
 
 _NO_INTERVAL = ("nees", "time")
 _PAPER = (("x", 100.0, 1), ("y", 100.0, 1), ("theta", 1e3, 0))
@@ -20,7 +20,7 @@ def table_one(sweep: Sweep, measures: Sequence[Measure], setting: str, condition
     """Detectors by rooms under one condition; `tested` are the pairs in each of the rooms."""
     columns = [MEASURES[name] for name in TABLE_I]
     cells = {
-        (room, name): [summary(sweep.cell(room, condition, name), column) for column in columns]
+        (room, name): [summary(sweep, column, room, condition, name) for column in columns]
         for room in sweep.rooms
         for name in sweep.detectors
         if sweep.cell(room, condition, name)
@@ -66,7 +66,7 @@ def cells_table(sweep: Sweep, measure: Measure, setting: str) -> Table:
     rows = [
         Row(
             f"{label(room)}, {condition.name}",
-            [shown_mean(measure, summary(sweep.cell(room, condition, name), measure)) for name in sweep.detectors]
+            [shown_mean(measure, summary(sweep, measure, room, condition, name)) for name in sweep.detectors]
             + [shown_mean(measure, wheels(sweep, measure, room, condition))],
         )
         for room in sweep.rooms

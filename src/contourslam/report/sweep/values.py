@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
+from contourslam.evaluation.paired_tests import Interval
+
 T = TypeVar("T")
 
 
@@ -70,6 +72,27 @@ class SweepRun:
     simulated: bool
     error: str
     row: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A measure over the drives of a cell.
+
+    Attributes
+    ----------
+    interval : Interval
+        Over the drives that were finished and know the measure.
+    runs, failed : int
+    """
+
+    interval: Interval
+    runs: int
+    failed: int
+
+    @property
+    def known(self) -> bool:
+        """Whether there is anything to show."""
+        return self.interval.count > 0
 
 
 @dataclass(frozen=True)
@@ -157,6 +180,11 @@ class Sweep:
     def cell(self, place: str, condition: Condition, detector: str) -> list[SweepRun]:
         """Runs of a detector at a place under a condition, one a drive."""
         return self._lookup.get((place, condition, detector), [])
+
+    @cached_property
+    def summaries(self) -> dict[tuple[str, Condition, str, str], Summary]:
+        """What :mod:`~contourslam.report.sweep.statistics` has computed, by place, condition, detector and measure."""
+        return {}
 
 
 def once(items: Iterable[T]) -> list[T]:
