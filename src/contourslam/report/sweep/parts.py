@@ -22,9 +22,9 @@ HOW = (
     "with, and the p-values of all pairs in a table are corrected by Holm's method: the chance that a table holds any "
     "false “better” is at most 5 %. Where a pair does not pass, no difference is shown, which is not to say that there "
     "is none; the interval named there is the widest of the pairs' own, and no bound on all of them at once. "
-    "Intervals are BCa bootstrap intervals of the mean (5000 draws, seed 0): called 95 %, they hold the true mean some "
-    "92 times in 100 with 20 seeds, and less often where errors are skewed. The test is of ranks, the interval of the "
-    "mean: a single bad drive moves the second only."
+    "Intervals are BCa bootstrap intervals of the mean (5000 draws, seed 0): called 95 %, they hold the true mean at "
+    "least 90 times in 100 with 20 seeds, 84 where errors are strongly skewed. The test is of ranks, the interval of "
+    "the mean: a single bad drive moves the second only."
 )
 LOST = (
     "A failed run counts as worse than any finished one. Such a difference is infinite: the tests take it in, the "
