@@ -25,7 +25,8 @@ def sweep(tmp_path, monkeypatch, capsys):
     """Run the command on an experiment, with its runs done in this process."""
 
     def here(runs, store, *, jobs, scheduler, observer, say):
-        over = do_runs(Task("session", program(), store.url, tuple(runs)), lambda *_: None)
+        over: list[tuple[str, str]] = []
+        do_runs(Task("session", program(), store.url, tuple(runs)), lambda *told: over.append(told))
         observer.progress(len(over), len(runs))
         failed = sum(status == "failed" for _, status in over)
         return Outcome(len(over) - failed, failed, True)

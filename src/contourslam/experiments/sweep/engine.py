@@ -172,7 +172,7 @@ class _Session:
                 raise error
         elif status != "finished":
             raise ContourslamError(_LOST)
-        # Not from what the task returns: an earlier try of it, whose worker died, may have done a part.
+        # Not from what it told alone: an earlier try of the task, whose worker died, may have done a part.
         found = {run.key: self._over.get(run.key) or self._store.status_of(run.key) for run in runs}
         self._over |= {key: known for key, known in found.items() if known is not None}
         return tuple(run for run in runs if found[run.key] is None) if status == "error" else ()

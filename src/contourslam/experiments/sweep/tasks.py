@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from itertools import groupby, pairwise
 
 from contourslam.errors import ContourslamError
-from contourslam.experiments.sweep.rows import DONE, FAILED, done_row, failed_row
+from contourslam.experiments.sweep.rows import FAILED, done_row, failed_row
 from contourslam.experiments.sweep.runs import Run
 from contourslam.experiments.sweep.store import Store
 from contourslam.experiments.sweep.versions import LIBRARIES, program
@@ -75,17 +75,12 @@ def pieces(runs: Sequence[Run], processes: int) -> list[tuple[Run, ...]]:
     return cut
 
 
-def do_task(task: Task) -> list[tuple[str, str]]:
+def do_task(task: Task) -> None:
     """Do the runs of a task that are not done, one after the other.
 
     Parameters
     ----------
     task : Task
-
-    Returns
-    -------
-    list of (str, str)
-        Key and status of each that was done here.
 
     Raises
     ------
@@ -94,17 +89,17 @@ def do_task(task: Task) -> list[tuple[str, str]]:
     """
     from distributed import get_worker
 
-    if program() != task.program:
-        raise ContourslamError(other_program(get_worker().address, program(), task.program))
     worker = get_worker()
+    if program() != task.program:
+        raise ContourslamError(other_program(worker.address, program(), task.program))
 
     def tell(key: str, status: str) -> None:
         worker.log_event(TOPIC, {"session": task.session, "key": key, "status": status})
 
-    return do_runs(task, tell)
+    do_runs(task, tell)
 
 
-def do_runs(task: Task, tell: Callable[[str, str], None]) -> list[tuple[str, str]]:
+def do_runs(task: Task, tell: Callable[[str, str], None]) -> None:
     """Do as :func:`do_task`, in this process and without Dask.
 
     Parameters
@@ -112,21 +107,13 @@ def do_runs(task: Task, tell: Callable[[str, str], None]) -> list[tuple[str, str
     task : Task
     tell : callable
         Called with key and status of each run that is over.
-
-    Returns
-    -------
-    list of (str, str)
-        The same of all that were done here.
     """
     store = Store(task.url)
-    over = []
     for run in task.runs:
         if task.session in _stopped:
             break
         if store.status_of(run.key) is None:
-            over.append((run.key, _do(run, store, task.session)))
-            tell(*over[-1])
-    return over
+            tell(run.key, _do(run, store, task.session))
 
 
 def dask_setup(worker: object) -> None:
@@ -164,4 +151,4 @@ def _do(run: Run, store: Store, session: str) -> str:
     seconds = time.perf_counter() - begun
     row = done_row(run, metrics, started=started, seconds=seconds, tries=tries)
     store.write_row(row)
-    return DONE if row["status"] == DONE else FAILED
+    return str(row["status"])
