@@ -14,7 +14,6 @@ from contourslam.graph.places import ROBUST_TIES, Keyframe, Place, Places
 from contourslam.graph.pose_graph import PoseGraph
 from contourslam.joining.joint import Joint, Tie
 from contourslam.maps.saved_map import SavedMap
-from contourslam.matching.align import align
 from contourslam.matching.small import invert
 
 HALF_WIDTH = 40.0  # m; contours farther from the anchor of a stretch are left out
@@ -25,10 +24,6 @@ REACH = 5.0  # m; a stretch of another run whose middle is this near may see wha
 TRIED = 3  # stretches that a keyframe is held against, until it fits one
 PAUSE = 0.45  # m of way after a tie to another run in which a further one would say little more
 LEAST_OVERLAP = 0.65
-# What is thought to be known of a keyframe as seen from another run's stretch, and how far a tie may contradict it:
-# m, m, rad. A tie from farther off would be a guess: whoever has driven apart for so long is looked for anew.
-SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
-PRIOR = np.diag(1.0 / SIGMA**2)
 LOOSER = 10.0  # by how much the tie of a joint that stays for good is looser than it is known
 STEPS_AFTER_JOINT = 5  # further steps of iSAM2
 
@@ -221,11 +216,10 @@ class CommonMap:
             if self.owners[anchor][0] is run or anchor in run.again:  # the robot itself ties to its own places
                 continue
             guess = between_one(self._graph.pose(anchor), pose)
-            found = align(self._keyframes[key].oriented, self._places.cells(place), guess, PRIOR)
-            off = np.abs(between_one(guess, found.pose))
-            if found.overlap >= LEAST_OVERLAP and (off < FARTHEST).all():
-                information = invert(self._places.match_covariance(place, key, found.pose))
-                self._found.append(Bond(anchor, key, found.pose, information, ROBUST_TIES, True))
+            # One from far off would be a guess: whoever has driven apart for so long is looked for anew.
+            found = self._places.tie(place, key, guess, LEAST_OVERLAP)
+            if found is not None:
+                self._found.append(Bond(anchor, key, found[0], invert(found[1]), ROBUST_TIES, True))
                 self._tied_at[run] = run.way[number]
                 self.ties += 1
                 return

@@ -13,8 +13,6 @@ from contourslam.fleet.runs import Run
 from contourslam.graph.keeping import keep, remember
 from contourslam.graph.landmark_maps import to_maps
 from contourslam.graph.landmark_set import find_landmark_set
-from contourslam.graph.memory import Settled
-from contourslam.graph.pose_graph import poses_of, spreads
 from contourslam.graph.refine import refine
 from contourslam.graph.sightings import Sightings
 from contourslam.maps.saved_map import Contoured, Relations, SavedMap, Seen, Stretches
@@ -121,7 +119,5 @@ def refined(saved: SavedMap, config: Config) -> SavedMap:
         With the covariances of its keyframes.
     """
     memory = remember(config, saved, make_detector(config.detector, adapted=config.adapted), np.zeros(3))
-    factors, values = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings)
-    count = len(memory.keyframes)
-    settled = Settled(poses_of(values, count), spreads(factors, values, np.arange(count)), factors)
+    settled = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings)
     return replace(keep(memory, settled, {}), about=saved.about)

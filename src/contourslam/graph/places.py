@@ -7,12 +7,16 @@ import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import between, between_one, compose, compose_one
+from contourslam.matching.align import align
 from contourslam.matching.cell_map import CellMap
 from contourslam.matching.certainty import Hold, hold, match_covariance
 from contourslam.matching.odometry import LocalMap
 from contourslam.matching.oriented import move
 
 ROBUST_TIES = 3.0  # width of the Cauchy kernel of a tie to a place seen before, in standard deviations
+# What is taken to be known of where a keyframe lies in a place, and how far a tie may contradict it: m, m, rad.
+SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
+PRIOR = np.diag(1.0 / SIGMA**2)
 KEPT = 48  # places whose contours are held ready; those of others are put together again from their keyframes
 
 
@@ -148,6 +152,30 @@ class Places:
         if len(self._ready) > KEPT:
             self._ready.popitem(last=False)
         return cells
+
+    def tie(self, number: int, key: int, guess: Floats, least: float) -> tuple[Floats, Floats] | None:
+        """Align a keyframe to a place in which it is thought to lie.
+
+        Parameters
+        ----------
+        number, key : int
+            Of the place, and of the keyframe.
+        guess : ndarray, shape (3,)
+            The keyframe's pose as seen from the place's anchor.
+        least : float
+            Part of the keyframe's points that must touch the place.
+
+        Returns
+        -------
+        (ndarray, ndarray) or None
+            The keyframe's pose as seen from the anchor, and its covariance in the keyframe's frame; None where it does
+            not fit, or only far from the guess.
+        """
+        found = align(self._keyframes[key].oriented, self.cells(number), guess, PRIOR)
+        off = np.abs(between_one(guess, found.pose))
+        if found.overlap < least or not (off < FARTHEST).all():
+            return None
+        return found.pose, self.match_covariance(number, key, found.pose)
 
     def match_covariance(self, number: int, key: int, seen: Floats) -> Floats:
         """Covariance of a keyframe's pose as seen from a place's anchor, in the keyframe's frame.

@@ -4,13 +4,12 @@ import gtsam
 import numpy as np
 
 from contourslam.contour.contours import Floats, Ints
-from contourslam.geometry.poses import between_one
 from contourslam.graph.landmark_factors import relations
 from contourslam.graph.landmark_set import find_landmark_set
+from contourslam.graph.memory import Settled
 from contourslam.graph.places import ROBUST_TIES, Keyframe, Places
-from contourslam.graph.pose_graph import PoseGraph, joined, keyframes_of, poses_of, relation, solve
+from contourslam.graph.pose_graph import PoseGraph, joined, keyframes_of, poses_of, relation, solve, spreads
 from contourslam.graph.sightings import Sightings
-from contourslam.matching.align import align
 from contourslam.matching.small import invert
 
 REACH = 5.0  # a place whose middle is this near is held against the keyframe, m
@@ -18,14 +17,11 @@ MOST_TIES = 3  # places a keyframe is held against
 APART = 3  # places before and after a keyframe's own that are not: their contours made its pose in the first place
 STILL = 0.1  # m that no keyframe moves farther than in a round after which no other is needed
 LEAST_OVERLAP = 0.6
-# What the solution so far is taken to know, and how far a tie may contradict it: m, m, rad.
-SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
-PRIOR = np.diag(1.0 / SIGMA**2)
 
 
 def refine(
     graph: PoseGraph, keyframes: list[Keyframe], places: Places | None, sightings: Sightings, rounds: int = 1
-) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+) -> Settled:
     """Solve the graph at once, tie every keyframe anew to the places around it and to all landmarks, and solve again.
 
     Parameters
@@ -42,11 +38,9 @@ def refine(
 
     Returns
     -------
-    factors : gtsam.NonlinearFactorGraph
-        Of all that was solved at last, but those of landmarks: for marginals, which change little by them and would
-        take ten times as long.
-    values : gtsam.Values
-        Of the keyframes.
+    Settled
+        Its factors are those of all that was solved at last, but of landmarks: its covariances change little by these
+        and would take ten times as long.
     """
     count = len(keyframes)
     factors = joined(graph.factors, graph.ties)
@@ -59,7 +53,7 @@ def refine(
         values = keyframes_of(solve(joined(factors, seen), landmarks), count)
         if np.abs((poses_of(values, count) - poses)[:, :2]).max() < STILL:
             break
-    return factors, values
+    return Settled(poses_of(values, count), spreads(factors, values, np.arange(count)), factors)
 
 
 def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.NonlinearFactorGraph:
@@ -68,14 +62,11 @@ def _ties(keyframes: list[Keyframe], poses: Floats, places: Places) -> gtsam.Non
     ties = gtsam.NonlinearFactorGraph()
     chosen = _pairs(poses, np.array([keyframe.drive for keyframe in keyframes]), places)
     for number in np.unique(chosen[:, 1]).tolist():
-        cells, anchor = places.cells(number), places.list[number].anchor
+        anchor = places.list[number].anchor
         for key in chosen[chosen[:, 1] == number, 0].tolist():
-            guess = places.into(number, poses[key])
-            found = align(keyframes[key].oriented, cells, guess, PRIOR)
-            off = np.abs(between_one(guess, found.pose))
-            if found.overlap >= LEAST_OVERLAP and (off < FARTHEST).all():
-                information = invert(places.match_covariance(number, key, found.pose))
-                ties.push_back(relation(anchor, key, found.pose, information, ROBUST_TIES))
+            found = places.tie(number, key, places.into(number, poses[key]), LEAST_OVERLAP)
+            if found is not None:
+                ties.push_back(relation(anchor, key, found[0], invert(found[1]), ROBUST_TIES))
     return ties
 
 

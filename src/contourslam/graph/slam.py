@@ -15,7 +15,7 @@ from contourslam.graph.landmarks import NOTHING
 from contourslam.graph.loops import LoopFinder, Tie
 from contourslam.graph.memory import Memory, Settled
 from contourslam.graph.places import ROBUST_TIES, Keyframe
-from contourslam.graph.pose_graph import poses_of, spreads
+from contourslam.graph.pose_graph import poses_of
 from contourslam.graph.refine import refine
 from contourslam.landmarks import trace
 from contourslam.matching.certainty import exposure
@@ -223,9 +223,8 @@ class GraphSlam:
         covariances = [covariance for _, _, covariance in self._scans]
         if self.config.graph.refine:
             places = self._places if self.config.graph.loops else None
-            factors, values = refine(self._graph, self._keyframes, places, self._landmarks.sightings)
-            poses, marginals = poses_of(values, count), spreads(factors, values, np.arange(count))
-            self.settled = Settled(poses, marginals, factors)
+            self.settled = refine(self._graph, self._keyframes, places, self._landmarks.sightings)
+            poses, marginals = self.settled.poses, self.settled.covariances
             still = np.zeros((3, 3))  # a scan lies as well to its keyframe as that to the local map
             covariances = [  # but for the first keyframe, which is known exactly, for the map begins there
                 known if key == 0 else moved(poses[key], marginals[key], seen, still)[1]

@@ -9,7 +9,7 @@ from contourslam.contour.contours import Floats
 from contourslam.geometry.angles import wrap_angle
 from contourslam.geometry.poses import between_one, compose_one, inverse
 from contourslam.graph.doubt import DoubtTree
-from contourslam.graph.refine import FARTHEST
+from contourslam.graph.places import FARTHEST
 from contourslam.graph.regrown import regrow
 from contourslam.joining.building import Pair, keyframes_of
 from contourslam.joining.joint import Joint, Tie

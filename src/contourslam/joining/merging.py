@@ -9,9 +9,8 @@ from contourslam.config import Config
 from contourslam.contour.contours import Ints
 from contourslam.detectors import make_detector
 from contourslam.graph.keeping import keep, remember
-from contourslam.graph.memory import Memory, Settled
+from contourslam.graph.memory import Memory
 from contourslam.graph.places import ROBUST_TIES
-from contourslam.graph.pose_graph import poses_of, spreads
 from contourslam.graph.refine import refine
 from contourslam.joining.again import Again, look_again
 from contourslam.joining.building import Pair, build, keyframes_of
@@ -132,9 +131,7 @@ def _tie(memory: Memory, again: Again) -> None:
 
 
 def _refined(memory: Memory, about: Mapping[str, str]) -> SavedMap:
-    count = len(memory.keyframes)
-    factors, values = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings, ROUNDS)
-    settled = Settled(poses_of(values, count), spreads(factors, values, np.arange(count)), factors)
+    settled = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings, ROUNDS)
     return keep(memory, settled, about)
 
 

@@ -4,15 +4,12 @@ import numpy as np
 
 from contourslam.contour.contours import Floats
 from contourslam.geometry.poses import between_one, inverse
+from contourslam.graph.places import FARTHEST, PRIOR
 from contourslam.joining.chart import Chart
 from contourslam.joining.joint import Tie
 from contourslam.joining.laying import LEAST_OVERLAP, Laid
 from contourslam.matching.align import align
 from contourslam.matching.certainty import hold, match_covariance
-
-# What the laying is taken to know, and how far a tie may contradict it: m, m, rad.
-SIGMA, FARTHEST = np.array([0.1, 0.1, 0.05]), np.array([0.3, 0.3, 0.1])
-PRIOR = np.diag(1.0 / SIGMA**2)
 
 
 def ties_of(first: Chart, second: Chart, laid: Laid) -> tuple[Tie, ...]:
