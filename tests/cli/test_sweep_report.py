@@ -61,6 +61,7 @@ def test_several_results_are_reported_as_one(tmp_path: Path, capsys: pytest.Capt
     [
         (["nothing", "-o", "out"], "holds no results of a sweep"),
         (["empty", "-o", "out"], "no run is done yet"),
+        (["damaged", "-o", "out"], "damaged/experiment.json: is none of a sweep"),
         (["there", "-o", "out", "--metric", "positoin"], "position"),
         (["there", "-o", "there", "--overwrite"], "choose another folder"),
         (["there", "-o", "there/report"], "is in the results there"),
@@ -75,6 +76,7 @@ def test_what_cannot_be_reported_is_said_in_a_line(
     monkeypatch.chdir(tmp_path)
     results(tmp_path / "there")
     results(tmp_path / "empty", 0)
+    (results(tmp_path / "damaged") / "experiment.json").write_text("[1]")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine").write_text("")
     assert main(["sweep-report", *arguments]) == 1

@@ -274,11 +274,17 @@ def read_results(url: str, *, every: bool = False) -> Any:
     ConfigError, MissingExtraError
         If the kind of URL is unknown, or its library is not installed.
     """
+    store, planned = open_results(url)
+    return store.read() if every else store.rows(planned.keys)
+
+
+def open_results(url: str) -> tuple[Store, Planned]:
+    """Open the results of a sweep that was begun. Errors as :func:`read_results`."""
     store = Store(url)
     planned = store.planned()
     if planned is None:
         raise ResultError(f"{url}: holds no results of a sweep; name the folder that `contourslam sweep -o` wrote")
-    return store.read() if every else store.rows(planned.keys)
+    return store, planned
 
 
 def _pa() -> Any:

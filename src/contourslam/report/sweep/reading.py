@@ -1,12 +1,10 @@
 """A sweep's results, wherever they lie, as its report needs them."""
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from contourslam.errors import ResultError
-from contourslam.experiments.sweep.files import open_place
-from contourslam.experiments.sweep.store import read_results
+from contourslam.experiments.sweep.store import open_results
 from contourslam.report.sweep.values import Condition, Drive, Sweep, SweepRun
 
 _HEAVY = ("traceback", "skipped")
@@ -41,13 +39,12 @@ def read_sweep(urls: Sequence[str]) -> Sweep:
     texts: list[str] = []
     expected: set[str] = set()
     for url in urls:
-        table = read_results(url)
+        store, experiment = open_results(url)
+        table = store.rows(experiment.keys)
         found = table.drop_columns([name for name in _HEAVY if name in table.column_names]).to_pylist()
         rows += [row | {_FROM: url} for row in found]
-        system, path = open_place(url)
-        experiment = json.loads(system.cat_file(f"{path}/experiment.json"))
-        texts.append(str(experiment["text"]))
-        expected |= set(experiment["keys"])
+        texts.append(experiment.text)
+        expected |= set(experiment.keys)
     if not rows:
         raise ResultError(f"{', '.join(urls)}: no run is done yet; wait for the first, or go on: contourslam sweep")
     return sweep_of(rows, texts, expected=len(expected))
