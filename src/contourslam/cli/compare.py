@@ -1,6 +1,5 @@
 """``contourslam compare``: runs held against each other, or the paper's experiment; either with its report."""
 
-import os
 import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -103,6 +102,7 @@ class Compare:
             raise ConfigError("--seeds must be at least 1 and --jobs 0 or more")
         from contourslam.detectors import make_detector
         from contourslam.experiments.noise import LEVELS
+        from contourslam.experiments.parallel import cores
         from contourslam.experiments.study import study
         from contourslam.report.comparison_metrics import comparison_metrics
         from contourslam.report.html import write_report
@@ -126,7 +126,7 @@ class Compare:
                 noise_levels=() if self.no_noise_sweep else LEVELS,
                 details=not self.no_details,
                 recording=recording,
-                jobs=self.jobs or os.cpu_count() or 1,
+                jobs=self.jobs or cores(),
                 observe=stages.observe,
             )
         if not any(seed.metrics for seed in outcome.comparison.seeds):

@@ -1,6 +1,7 @@
 """Independent pieces of work on several processes, with progress, that can be stopped and keep what is done."""
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -14,6 +15,11 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 _POLL = 0.2  # s
+
+
+def cores() -> int:
+    """How many cores of the machine are lent to this process."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,11 @@
 """Which software and which machine a result came from."""
 
-import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from contourslam import __version__
+from contourslam.experiments.parallel import cores
 
 
 def software() -> dict[str, str]:
@@ -21,8 +21,7 @@ def software() -> dict[str, str]:
 
 def machine() -> dict[str, str]:
     """Processor, number of cores it lends us, and operating system."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return {"processor": _processor(), "cores": str(cores), "system": f"{platform.system()} {platform.machine()}"}
+    return {"processor": _processor(), "cores": str(cores()), "system": f"{platform.system()} {platform.machine()}"}
 
 
 def _processor() -> str:

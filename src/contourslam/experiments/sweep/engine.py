@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import math
-import os
 import secrets
 import threading
 import time
@@ -13,7 +12,7 @@ from typing import Any
 
 from contourslam.errors import ConfigError, ContourslamError
 from contourslam.evaluation.extras import require
-from contourslam.experiments.parallel import Observer
+from contourslam.experiments.parallel import Observer, cores
 from contourslam.experiments.sweep.reach import no_scheduler, reach
 from contourslam.experiments.sweep.rows import DONE, FAILED
 from contourslam.experiments.sweep.runs import Run
@@ -93,7 +92,7 @@ def sweep(
         say(f"connecting to {scheduler}")
         if not reach(scheduler, _PATIENCE, observer.stopped):
             return Outcome(0, 0, False)
-    with _client(min(jobs or _cores(), len(runs)), scheduler) as client:
+    with _client(min(jobs or cores(), len(runs)), scheduler) as client:
         threads = _check_workers(client, scheduler)
         return _Session(client, store, observer, say).do(pieces(runs, threads))
 
@@ -183,10 +182,6 @@ class _Session:
         if message["session"] == self._name:
             self._over[message["key"]] = message["status"]
             self._woken.set()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager
