@@ -39,9 +39,14 @@ def open_place(url: str) -> tuple[Any, str]:
     return system, str(path)
 
 
+def protocols(system: Any) -> set[str]:
+    """Names by which URLs call a file system."""
+    return set(system.protocol) if isinstance(system.protocol, tuple) else {system.protocol}
+
+
 def is_local(system: Any) -> bool:
     """Whether a file system is this machine's own."""
-    return "file" in (system.protocol if isinstance(system.protocol, tuple) else (system.protocol,))
+    return "file" in protocols(system)
 
 
 def matching(pattern: str, folder: Path) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from contourslam.atomic import write_bytes
 from contourslam.errors import ContourslamError, ResultError
-from contourslam.experiments.sweep.files import is_local, open_place
+from contourslam.experiments.sweep.files import is_local, open_place, protocols
 
 _WHOLE = {"memory", "s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss", "oci"}
 """Stores that show an object only once it is whole; on others a file is moved into its place."""
@@ -27,8 +27,7 @@ class Place:
     def __init__(self, url: str) -> None:
         self.url = url if "://" in url else str(Path(url).resolve())
         self._system, self._root = open_place(self.url)
-        kinds = self._system.protocol if isinstance(self._system.protocol, tuple) else (self._system.protocol,)
-        self._whole = bool(_WHOLE & set(kinds))
+        self._whole = bool(_WHOLE & protocols(self._system))
 
     def names(self, folder: str) -> list[str]:
         """Names of the files and folders in a folder, in alphabetical order."""

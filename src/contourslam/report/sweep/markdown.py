@@ -7,6 +7,7 @@ replaced. So a document can hold numbers that nobody typed.
 import re
 import tempfile
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 
 from contourslam.atomic import make_folder, write_text
@@ -110,7 +111,7 @@ def _item(item: Item, stem: str) -> str:
             return f"{caption}:\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines)
         case Charts(charts):
             images = "\n".join(
-                f'<img src="{_PICTURES}/{stem}_{chart.name}.svg" alt="{_attribute(chart.alt)}" width="49%">'
+                f'<img src="{_PICTURES}/{stem}_{chart.name}.svg" alt="{escape(chart.alt)}" width="49%">'
                 for chart in charts
             )
             return f"<p>\n{images}\n</p>"
@@ -122,7 +123,3 @@ def _cell(cell: Cell) -> str:
     text = f"{cell.text} ({cell.small})" if cell.small else cell.text
     text = text.replace("|", "\\|").replace("<", "&lt;")
     return f"**{text}**" if cell.better else text
-
-
-def _attribute(text: str) -> str:
-    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

@@ -208,7 +208,7 @@ class Parts:
             charts = [chart for chart in drawn if chart is not None]
             if charts:
                 centre = self.sweep.centre(setting)
-                fixed = "" if centre is None else f"{centre.beams} beams" if axis == "noise" else _noise(centre.noise)
+                fixed = "" if centre is None else f"{centre.beams} beams" if axis == "noise" else centre.noise_name
                 items += [Heading(f"{label(setting)}, {fixed}"), Charts(charts)]
         return items
 
@@ -277,10 +277,6 @@ class Parts:
         for text in self.sweep.experiments:
             items += [Heading("The experiment"), Code(text.strip(), "toml")]
         return Part("reproduce", "Reproduce this", items)
-
-
-def _noise(noise: float | None) -> str:
-    return "the lidar's own noise" if noise is None else f"{100 * noise:g} cm of noise"
 
 
 def _versions(sweep: Sweep) -> dict[str, str]:

@@ -46,8 +46,12 @@ class Condition:
     @property
     def name(self) -> str:
         """Say it in words, without the setting."""
-        noise = "the lidar's own noise" if self.noise is None else f"{100 * self.noise:g} cm of noise"
-        return noise if self.beams is None else f"{noise}, {self.beams} beams"
+        return self.noise_name if self.beams is None else f"{self.noise_name}, {self.beams} beams"
+
+    @property
+    def noise_name(self) -> str:
+        """Say the noise in words."""
+        return "the lidar's own noise" if self.noise is None else f"{100 * self.noise:g} cm of noise"
 
 
 @dataclass(frozen=True, slots=True)
