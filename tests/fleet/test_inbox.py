@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,15 @@ from hypothesis import strategies as st
 from hypothesis.stateful import Bundle, RuleBasedStateMachine, invariant, precondition, rule
 
 from contourslam.errors import JournalError, MessageError
+from contourslam.fleet import wire as wire_module
+from contourslam.fleet.compact import Writer
 from contourslam.fleet.facts import Answer, KeyframeFact, Report, Status
 from contourslam.fleet.inbox import AHEAD, AHEAD_BYTES, TURNS, Inbox
 from contourslam.fleet.journal import Journal
 from contourslam.fleet.reporter_outbox import PATIENCE, Allowance, Outbox
-from contourslam.fleet.wire import encode
+from contourslam.fleet.server import FleetServer
+from contourslam.fleet.wire import HEAD, MAGIC, NUMBER_BITS, VERSION, encode
+from contourslam.fleet.wire_facts import FACT, SIZES, take_facts
 
 ROBOT = "robot1"
 
@@ -313,6 +318,49 @@ def test_a_file_whose_reports_are_not_in_their_places_is_refused(tmp_path: Path)
     journal = Journal(tmp_path / "x.facts")
     journal.add(report(1))
     with pytest.raises(JournalError, match="not in its place"):
+        Inbox(tmp_path)
+
+
+def unreadable(number: int) -> bytes:
+    """A report whose envelope and number are sound, and whose facts are of no kind."""
+    writer = Writer(np.array(SIZES))
+    writer.put(-NUMBER_BITS, number)
+    writer.count(FACT, 1, 1)
+    writer.put(FACT, 9)
+    body = bytes([len(ROBOT)]) + ROBOT.encode() + (1).to_bytes(8, "little") + writer.packed()
+    return HEAD.pack(MAGIC, VERSION, b"R", zlib.crc32(b"R" + body)) + body
+
+
+def test_a_kept_report_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox, decoded = Inbox(tmp_path), []
+    numbers(inbox, *(report(number) for number in range(5)))
+    monkeypatch.setattr(wire_module, "take_facts", lambda reader: decoded.append(reader) or take_facts(reader))
+    inbox = again(inbox, tmp_path)
+    assert inbox.state((ROBOT, 1)) == (5, ())
+    assert not decoded
+    assert len(list(inbox.kept())) == len(decoded) == 5
+
+
+def test_a_kept_report_of_no_known_facts_is_refused_when_it_is_taken_up(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "0-x.facts")
+    journal.add(report(0))
+    journal.add(unreadable(1))
+    inbox = Inbox(tmp_path)
+    with pytest.raises(JournalError, match=r"0-x\.facts: holds what this program cannot read: a fact in it"):
+        list(inbox.kept())
+    inbox.close()
+
+
+def test_a_server_that_cannot_read_what_was_kept_lets_go_of_the_folder(tmp_path: Path) -> None:
+    Journal(tmp_path / "0-x.facts").add(unreadable(0))
+    for _ in range(2):  # a folder that is still held would be told of instead
+        with pytest.raises(JournalError, match="cannot read"):
+            FleetServer(inbox=Inbox(tmp_path))
+
+
+def test_a_file_that_holds_something_else_than_reports_is_refused(tmp_path: Path) -> None:
+    Journal(tmp_path / "x.facts").add(status(1))
+    with pytest.raises(JournalError, match="no report"):
         Inbox(tmp_path)
 
 

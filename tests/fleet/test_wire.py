@@ -13,7 +13,7 @@ from contourslam.errors import MessageError
 from contourslam.fleet import wire_contours, wire_facts, wire_sightings
 from contourslam.fleet.compact import Reader, Writer
 from contourslam.fleet.facts import Answer, Fact, KeyframeFact, RelationFact, Report, Status, StretchFact
-from contourslam.fleet.wire import HEAD, LONGEST, decode, encode
+from contourslam.fleet.wire import HEAD, LONGEST, decode, encode, head
 
 NAMES = st.sampled_from(["a", "robot_1", "X4.front-left", "r" * 64])
 RUNS = st.integers(0, 2**63 - 1)
@@ -162,6 +162,7 @@ def assert_spread(matrix: Any, told: Any) -> None:
 @given(REPORTS)
 def test_a_report_comes_back_within_the_stated_bounds(report: Report) -> None:
     told = decode(encode(report))
+    assert head(encode(report)) == (report.robot, report.run, report.number)
     assert isinstance(told, Report)
     assert (told.robot, told.run, told.number) == (report.robot, report.run, report.number)
     assert len(told.facts) == len(report.facts)
@@ -222,8 +223,9 @@ def test_a_message_with_one_wrong_bit_or_cut_short_is_refused(message: Report | 
     wrong = bytearray(whole)
     wrong[at] ^= 1 << bit
     for damaged in (bytes(wrong), whole[:at], whole + b"\0"):
-        with pytest.raises(MessageError):
-            decode(damaged)
+        for read in (decode, head):
+            with pytest.raises(MessageError):
+                read(damaged)
 
 
 @settings(max_examples=100)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from contourslam.errors import JournalError
 from contourslam.fleet.facts import Report, Status
-from contourslam.fleet.journal import SUFFIX, Journal, journals, read_report
+from contourslam.fleet.journal import SUFFIX, Journal, journals, read_head, read_report
 from contourslam.fleet.journal_lock import Lock
 from contourslam.fleet.wire import checksum, decode
 
@@ -107,7 +107,7 @@ class Inbox:
         Raises
         ------
         JournalError
-            If they cannot be read.
+            If they cannot be read, or hold facts that are none.
         """
         for shelf in self._shelves.values():
             if shelf.journal is not None:
@@ -252,16 +252,16 @@ class Inbox:
     def _recall(self, path: Path) -> None:
         """Take in what was kept of one run."""
         journal = Journal(path)
-        given = path.name.partition("-")[0]
-        self._journals = max(self._journals, int(given) + 1 if given.isdecimal() else 0)
+        counted = path.name.partition("-")[0]
+        self._journals = max(self._journals, int(counted) + 1 if counted.isdecimal() else 0)
         if journal.trouble:
             self.troubles.append(journal.trouble)
         shelf, source = _Shelf(journal), None
         for number, data in enumerate(journal.reports()):
-            report = read_report(path, data)
-            if report.number != number or source not in (None, (report.robot, report.run)):
+            robot, run, own = read_head(path, data)
+            if own != number or source not in (None, (robot, run)):
                 raise JournalError(f"{path}: report {number} is not in its place; move the file elsewhere")
-            source = report.robot, report.run
+            source = robot, run
             shelf.checksums.append(checksum(data))
         if source is not None:
             if (other := self._shelves.get(source)) is not None and other.journal is not None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from contourslam.atomic import make_folder
 from contourslam.errors import JournalError, MessageError, ResultError
 from contourslam.fleet.facts import Report
-from contourslam.fleet.wire import LONGEST, decode
+from contourslam.fleet.wire import LONGEST, decode, head
 
 SUFFIX = ".facts"
 BEGINNING = b"contourslam facts 1\n"
@@ -119,10 +119,10 @@ class Journal:
         try:
             with self.path.open("rb") as file:
                 size = os.fstat(file.fileno()).st_size
-                head = file.read(len(BEGINNING))
-                if not BEGINNING.startswith(head):
+                beginning = file.read(len(BEGINNING))
+                if not BEGINNING.startswith(beginning):
                     raise JournalError(f"{self.path}: is no journal of a fleet; move it elsewhere")
-                end = len(head) if len(head) == len(BEGINNING) else 0
+                end = len(beginning) if len(beginning) == len(BEGINNING) else 0
                 while end and end < size:
                     begin = file.read(RECORD.size)
                     length, checksum = RECORD.unpack(begin) if len(begin) == RECORD.size else (0, 0)
@@ -176,6 +176,18 @@ def journals(folder: Path) -> Iterator[Path]:
     yield from sorted(folder.glob(f"*{SUFFIX}"))
 
 
+def read_head(path: Path, data: bytes) -> tuple[str, int, int]:
+    """Give robot, run and number of a report that was kept; its facts are not looked at.
+
+    Raises
+    ------
+    JournalError
+        If it is none.
+    """
+    with _readable(path):
+        return head(data)
+
+
 def read_report(path: Path, data: bytes) -> Report:
     """Decode a report that was kept.
 
@@ -184,10 +196,16 @@ def read_report(path: Path, data: bytes) -> Report:
     JournalError
         If it is none.
     """
-    try:
+    with _readable(path):
         message = decode(data)
-    except MessageError as error:
-        raise JournalError(f"{path}: holds what this program cannot read: {error}") from error
     if not isinstance(message, Report):
         raise JournalError(f"{path}: holds what is no report; move it elsewhere")
     return message
+
+
+@contextlib.contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except MessageError as error:
+        raise JournalError(f"{path}: holds what this program cannot read: {error}") from error

@@ -11,6 +11,7 @@ import numpy as np
 
 from contourslam.config import Config
 from contourslam.contour.contours import Floats
+from contourslam.errors import JournalError
 from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
 from contourslam.fleet.facts import Answer, KeyframeFact, Report
@@ -66,7 +67,7 @@ class FleetServer:
     Raises
     ------
     JournalError
-        If what the inbox holds cannot be read.
+        If what the inbox holds cannot be read; the inbox is closed then.
     """
 
     def __init__(
@@ -80,7 +81,11 @@ class FleetServer:
         self._config, self._inbox, self._sites = config or Config(), inbox or Inbox(), dict(sites or {})
         self._clock = clock
         self._lock = threading.Lock()  # held for moments; what follows is changed under it
-        self._fresh: deque[Report] = deque(self._inbox.kept())
+        try:
+            self._fresh: deque[Report] = deque(self._inbox.kept())
+        except JournalError:
+            self._inbox.close()  # there is no server: another one may have the folder, once it is mended
+            raise
         self._faults = Faults()
         for trouble in self._inbox.troubles:
             self._faults.note(trouble)

@@ -42,6 +42,7 @@ MOST_MISSING, MOST_ROBOTS = 1000, 1000
 _NUMBER, _KEYFRAME, _POSE, _MATRIX, _MISSING, _ROBOTS = 0, 1, 2, 5, 11, 12
 _SMALL = np.array([8, 8, 12, 12, 12, 11, 11, 11, 4, 4, 4, 2, 2])
 _LARGE = np.array(SIZES)
+_NONE = np.zeros(0, np.int64)
 
 
 def check_name(robot: str) -> str:
@@ -98,6 +99,33 @@ def decode(data: bytes) -> Message:
     MessageError
         If they are damaged, foreign, of another version or too long; it says which.
     """
+    kind, robot, run, rest = _opened(data)
+    reader = Reader(rest, _LARGE if kind == b"R" else _SMALL)
+    readers: dict[bytes, Callable[[Reader, str, int], Message]]
+    readers = {b"R": _take_report, b"S": _take_status, b"A": _take_answer}
+    if kind not in readers:
+        raise MessageError(f"a message of an unknown kind ({kind!r}); it is foreign")
+    message = readers[kind](reader, robot, run)
+    reader.end()
+    return message
+
+
+def head(data: bytes) -> tuple[str, int, int]:
+    """Give robot, run and number of a report, without looking at its facts, which take all the time.
+
+    Raises
+    ------
+    MessageError
+        If it is no report, or one that is damaged, foreign or of another version; its facts may still be.
+    """
+    kind, robot, run, rest = _opened(data)
+    if kind != b"R":
+        raise MessageError("a message that is no report")
+    return robot, run, Reader(rest, _NONE).take(-NUMBER_BITS)
+
+
+def _opened(data: bytes) -> tuple[bytes, str, int, bytes]:
+    """Give kind, robot, run and packed numbers of a message that came undamaged."""
     if len(data) > LONGEST:
         raise MessageError(f"a message of {len(data)} bytes is longer than any; it is damaged or foreign")
     if len(data) < HEAD.size + 10 or not data.startswith(MAGIC):
@@ -112,14 +140,7 @@ def decode(data: bytes) -> Message:
     robot, run = body[1:until].decode("latin-1"), int.from_bytes(body[until : until + 8], "little")
     if len(body) < until + 8 or run >> RUN_BITS or NAME.fullmatch(robot) is None:
         raise MessageError("a message of nobody: its name or run is none; it is damaged or foreign")
-    reader = Reader(body[until + 8 :], _LARGE if kind == b"R" else _SMALL)
-    readers: dict[bytes, Callable[[Reader, str, int], Message]]
-    readers = {b"R": _take_report, b"S": _take_status, b"A": _take_answer}
-    if kind not in readers:
-        raise MessageError(f"a message of an unknown kind ({kind!r}); it is foreign")
-    message = readers[kind](reader, robot, run)
-    reader.end()
-    return message
+    return kind, robot, run, body[until + 8 :]
 
 
 def checksum(data: bytes) -> int:
