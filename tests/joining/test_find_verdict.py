@@ -61,5 +61,5 @@ def test_a_verdict_and_its_hurdle_agree() -> None:
 
 def test_what_was_seen_through_counts_against() -> None:
     assert worth(50.0, 0.0) == 50.0
-    assert worth(50.0, 0.1) < 30.0
-    assert worth(50.0, 0.5) < 0.0
+    assert worth(50.0, 11.0) < 30.0  # a tenth of what either map has there
+    assert worth(50.0, 100.0) < 0.0

@@ -93,7 +93,7 @@ def joint(first: SavedMap, second: SavedMap, ties: int = 5) -> Joint:
     pairs = np.argwhere(np.hypot(*(one[:, None] - other[None])[..., :2].transpose(2, 0, 1)) < NEAR)
     assert len(pairs) > ties
     chosen = pairs[np.linspace(0, len(pairs) - 1, ties).astype(int)].tolist()
-    found = tuple(Tie(a, b, between_one(one[a], other[b]), TIED, 1.0, 0.01) for a, b in chosen)
+    found = tuple(Tie(a, b, between_one(one[a], other[b]), TIED) for a, b in chosen)
     a, b = chosen[0]
     pose = compose_one(compose_one(frames(first).poses[a], found[0].pose), inverse(frames(second).poses[b]))
     return Joint(pose, found, Evidence(10, 10, 20.0, 0.0, 10.0, 0.1), "constellation")

@@ -12,7 +12,7 @@ from contourslam.fleet.runs import Identity, Run
 from contourslam.geometry.poses import between_one, compose, compose_one, inverse
 from contourslam.graph.places import ROBUST_TIES, Keyframe, Place, Places
 from contourslam.graph.pose_graph import PoseGraph
-from contourslam.joining.joint import Joint, Tie
+from contourslam.joining.joint import Joint
 from contourslam.maps.saved_map import SavedMap
 from contourslam.matching.small import invert
 
@@ -24,7 +24,6 @@ REACH = 5.0  # m; a stretch of another run whose middle is this near may see wha
 TRIED = 3  # stretches that a keyframe is held against, until it fits one
 PAUSE = 0.45  # m of way after a tie to another run in which a further one would say little more
 LEAST_OVERLAP = 0.65
-LOOSER = 10.0  # by how much the tie of a joint that stays for good is looser than it is known
 STEPS_AFTER_JOINT = 5  # further steps of iSAM2
 
 
@@ -229,7 +228,7 @@ class CommonMap:
 
     def laid_by(self, joint: Joint, other: "CommonMap") -> Joint:
         """Give a joint of some time ago as its surest tie lays the other map now."""
-        surest = _surest(joint)
+        surest = joint.surest
         there = compose_one(self._poses[surest.first], surest.pose)
         return replace(joint, pose=compose_one(there, inverse(other._poses[surest.second])))
 
@@ -259,13 +258,8 @@ class CommonMap:
             self._known.setdefault(identity, key + offset)
         for bond in (*other._bonds, *other._found):
             self._relate(replace(bond, first=bond.first + offset, second=bond.second + offset))
-        for tie in joint.ties:
-            information = invert(tie.covariance)
-            self._relate(Bond(tie.first, tie.second + offset, tie.pose, information, ROBUST_TIES, True))
-        # One tie stays whatever a refinement finds, so that no run ever hangs loose; held looser, for it counts twice.
-        surest = _surest(joint)
-        information = invert(surest.covariance) / LOOSER**2
-        self._relate(Bond(surest.first, surest.second + offset, surest.pose, information, ROBUST_TIES, False))
+        for tie, information, replaceable in joint.bonds():
+            self._relate(Bond(tie.first, tie.second + offset, tie.pose, information, ROBUST_TIES, replaceable))
         self._graph.update(STEPS_AFTER_JOINT)
         for place in other._places.list:
             members = tuple(member + offset for member in place.members)
@@ -308,7 +302,3 @@ class CommonMap:
             self._graph.recall(bond.first, bond.second, bond.pose, bond.information, bond.robust, tie=bond.tie, now=now)
         self._graph.update()
         self.refresh()
-
-
-def _surest(joint: Joint) -> Tie:
-    return min(joint.ties, key=lambda tie: float(np.trace(tie.covariance[:2, :2])))

@@ -75,8 +75,8 @@ def kept_joints(folder: Path) -> Iterator[KeptJoint]:
 def _kept(row: dict[str, Any]) -> KeptJoint:
     joint = row["joint"]
     ties = tuple(
-        Tie(**{**tie, "pose": np.array(tie["pose"]), "covariance": np.array(tie["covariance"])})
-        for tie in joint["ties"]
+        Tie(tie["first"], tie["second"], np.array(tie["pose"]), np.array(tie["covariance"]))
+        for tie in joint["ties"]  # older files say more of each, which nobody needs
     )
     whole = Joint(np.array(joint["pose"]), ties, Evidence(**joint["evidence"]), joint["method"])
     owners = (tuple((str(name), int(run), int(key)) for name, run, key in row[end]) for end in ("first", "second"))

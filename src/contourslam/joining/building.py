@@ -1,7 +1,7 @@
 """Several maps put side by side as one, before it is solved: keyframes, what binds them, what they saw."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from contourslam.graph.places import ROBUST_TIES
 from contourslam.joining.joint import Joint
 from contourslam.joining.shared import identify
 from contourslam.maps.saved_map import Contoured, Relations, SavedMap, Seen, Stretches
-from contourslam.matching.small import invert, turned
+from contourslam.matching.small import turned
 
 Pair = tuple[int, int]
 """Two maps by their numbers; the second is seen from the first."""
@@ -22,9 +22,6 @@ Pair = tuple[int, int]
 NOT_JOINABLE = (
     "the map cannot be joined to others: it holds no keyframes, or not what binds them; map anew with --back-end graph"
 )
-# One tie of each joint stays whatever a refinement finds, so that no map ever hangs loose. It is held this much looser,
-# for the refinement ties the same keyframes anew, and nothing is to count twice.
-LOOSER = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,13 +178,10 @@ def _relations(parts: Sequence[_Part], joints: Mapping[Pair, Joint]) -> Relation
 def _ties(parts: Sequence[_Part], joints: Mapping[Pair, Joint]) -> Iterator[tuple[int, int, Floats, Floats, bool]]:
     """Keyframes, pose and information of all ties of the joints, and of the surest of each once more, to stay."""
     for (first, second), joint in joints.items():
-        keys = [(int(parts[first].keys[tie.first]), int(parts[second].keys[tie.second])) for tie in joint.ties]
-        ties = [(*pair, tie) for pair, tie in zip(keys, joint.ties, strict=True) if pair[0] != pair[1]]
-        for one, other, tie in ties:
-            yield one, other, tie.pose, invert(tie.covariance), True
-        if ties:
-            one, other, tie = min(ties, key=lambda row: float(np.trace(row[2].covariance[:2, :2])))
-            yield one, other, tie.pose, invert(tie.covariance) / LOOSER**2, False
+        one, other = parts[first].keys, parts[second].keys
+        ties = tuple(tie for tie in joint.ties if one[tie.first] != other[tie.second])
+        for tie, information, replaceable in replace(joint, ties=ties).bonds():
+            yield int(one[tie.first]), int(other[tie.second]), tie.pose, information, replaceable
 
 
 def _seen(parts: Sequence[_Part]) -> Seen:

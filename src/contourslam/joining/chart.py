@@ -36,8 +36,6 @@ class StretchView:
     ----------
     anchor : int
         Keyframe in the middle of the stretch, in whose frame all is given.
-    members : ndarray of int, shape (n,)
-        Keyframes of the stretch.
     view : View
         Contour points, and where each was seen from.
     landmarks : Constellation
@@ -45,7 +43,6 @@ class StretchView:
     """
 
     anchor: int
-    members: Ints
     view: View
     landmarks: Constellation
 
@@ -123,7 +120,7 @@ class Chart:
         points, origins = points[near], origins[near]
         first = np.sort(np.unique(squares_of(points, MERGED), return_index=True)[1])
         view = view_of(points[first], origins[first])
-        return StretchView(anchor, members, view, _among(self.landmarks, back, view.points))
+        return StretchView(anchor, view, _among(self.landmarks, back, view.points))
 
     @cached_property
     def _anchors(self) -> Ints:

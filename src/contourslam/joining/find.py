@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats
-from contourslam.geometry.angles import wrap
-from contourslam.geometry.poses import between, between_one, compose, compose_one, inverse, transform
+from contourslam.geometry.poses import between, between_one, compose, compose_one, inverse
+from contourslam.joining.carrying import frame_among
 from contourslam.joining.chart import Chart
 from contourslam.joining.joint import Apart, Evidence, Joint, Tie
 from contourslam.joining.laying import Laid, lay, thinned
@@ -63,7 +63,7 @@ def find_joint(first: Chart, second: Chart, *, observer: Observer | None = None)
             looks += [turned_round(each, second, first) for each in back]
         if observer is not None:
             observer(done + 1, count)
-    return decide(first, second, looks)
+    return _decided(first, second, looks)
 
 
 def decide(first: Chart, second: Chart, looks: Iterable[Look]) -> Joint | Apart:
@@ -177,7 +177,8 @@ def _joint(first: Chart, second: Chart, best: _Hypothesis, rival: float) -> Join
     way = _way(second, laid)
     evidence = Evidence(corners, walls, 0.5 * (tally.agreeing + tally.found), tally.contradicted, way, rival)
     method = max(best.looks, key=lambda each: each.odds).method
-    return Joint(_pose(second, laid), ties_of(first, second, laid), evidence, method)
+    pose, _ = frame_among(second.frames.poses[laid.keyframes[laid.fits]], laid.poses[laid.fits])
+    return Joint(pose, ties_of(first, second, laid), evidence, method)
 
 
 def _way(second: Chart, laid: Laid) -> float:
@@ -185,15 +186,6 @@ def _way(second: Chart, laid: Laid) -> float:
     steps = np.diff(second.way[laid.keyframes])
     both = laid.fits[1:] & laid.fits[:-1] & (np.diff(second.frames.drives[laid.keyframes]) == 0)
     return float(steps[both & (steps < 2.0)].sum())
-
-
-def _pose(second: Chart, laid: Laid) -> Floats:
-    """Rigid motion that lays all keyframes best that fit."""
-    own, there = second.frames.poses[laid.keyframes[laid.fits]], laid.poses[laid.fits]
-    turns = wrap(there[:, 2] - own[:, 2])
-    turn = float(np.arctan2(np.sin(turns).sum(), np.cos(turns).sum()))
-    middle = transform(np.array([0.0, 0.0, turn]), own[:, :2].mean(axis=0))
-    return np.array([*(there[:, :2].mean(axis=0) - middle), turn])
 
 
 def inverted(found: Joint | Apart) -> Joint | Apart:

@@ -91,11 +91,11 @@ def find_groups(maps: Sequence[SavedMap], joints: Mapping[Pair, Joint]) -> tuple
     left_out: list[LeftOut] = []
     for (first, second), (one, other) in shared([way.keyframes for way in ways]).items():
         if not _path(tree, first, second):
-            tie = Tie(int(one[0]), int(other[0]), np.zeros(3), EXACT, 1.0, 0.0)
+            tie = Tie(int(one[0]), int(other[0]), np.zeros(3), EXACT)
             mine, theirs = ways[first].keyframes.poses[tie.first], ways[second].keyframes.poses[tie.second]
             _connect(tree, (first, second), tie, compose_one(mine, inverse(theirs)))
     for pair in sorted(joints, key=lambda pair: (-strength(joints[pair]), pair)):
-        tie, path = surest(joints[pair]), _path(tree, *pair)
+        tie, path = joints[pair].surest, _path(tree, *pair)
         if path:
             off, covariance = _contradiction(ways, path, tie)
             if float(off @ solve(covariance, off)) > UNLIKELY and (np.abs(off) > FARTHEST).any():
@@ -105,11 +105,6 @@ def find_groups(maps: Sequence[SavedMap], joints: Mapping[Pair, Joint]) -> tuple
             _connect(tree, pair, tie, joints[pair].pose)
         holding.append(pair)
     return _groups(ways, tree, holding, left_out)
-
-
-def surest(joint: Joint) -> Tie:
-    """Give the tie of a joint that is known best."""
-    return min(joint.ties, key=lambda tie: float(np.trace(tie.covariance[:2, :2])))
 
 
 @dataclass(frozen=True, slots=True)

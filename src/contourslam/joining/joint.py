@@ -1,9 +1,17 @@
 """What is found out about two maps: how one lies in the other and what speaks for it, or why they stay apart."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from contourslam.contour.contours import Floats
+from contourslam.matching.small import invert
+
+# One tie of each joint stays whatever a refinement finds, so that no map ever hangs loose. It is held this much looser,
+# for the refinement ties the same keyframes anew, and nothing is to count twice.
+LOOSER = 10.0
 
 Reason = Literal["nothing alike", "too little", "ambiguous", "contradicted"]
 
@@ -20,18 +28,12 @@ class Tie:
         The second's keyframe seen from the first's: m, m, rad.
     covariance : ndarray, shape (3, 3)
         In the frame of the second's keyframe.
-    overlap : float
-        Part of its contour points that touch the first map.
-    residual : float
-        Root mean square of their distances, m.
     """
 
     first: int
     second: int
     pose: Floats
     covariance: Floats
-    overlap: float
-    residual: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,18 @@ class Joint:
     ties: tuple[Tie, ...]
     evidence: Evidence
     method: str
+
+    @property
+    def surest(self) -> Tie:
+        """The tie that is known best."""
+        return min(self.ties, key=lambda tie: float(np.trace(tie.covariance[:2, :2])))
+
+    def bonds(self) -> Iterator[tuple[Tie, Floats, bool]]:
+        """All ties with their information, and the surest once more: whether each may be replaced by a refinement."""
+        for tie in self.ties:
+            yield tie, invert(tie.covariance), True
+        if self.ties:
+            yield self.surest, invert(self.surest.covariance) / LOOSER**2, False
 
 
 @dataclass(frozen=True, slots=True)

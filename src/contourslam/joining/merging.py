@@ -90,6 +90,9 @@ def merge_maps(
 def merge_group(maps: Sequence[SavedMap], joints: Mapping[Pair, Joint], group: Group, config: Config) -> Merged:
     """Make one map of those of a group; the arguments are those of :func:`merge_maps`."""
     members = [maps[number] for number in group.members]
+    if len(members) == 1:
+        keys = (np.arange(len(keyframes_of(members[0]))),)
+        return Merged(members[0], group.members, keys, group.joints, group.left_out)
     place = {number: n for n, number in enumerate(group.members)}
     built = build(members, group.frames, {(place[a], place[b]): joints[a, b] for a, b in group.joints})
     first, whole = members[0], built.saved

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from contourslam.contour.contours import Floats, Ints
 from contourslam.geometry.poses import inverse, transform
-from contourslam.joining.verdict import AGAINST, worth
+from contourslam.joining.verdict import worth
 from contourslam.kernels import kernel
 from contourslam.localization.free_space import CELL, FreeSpace, see_free
 from contourslam.maps.saved_map import Contoured
@@ -50,7 +50,7 @@ class Tally:
     @property
     def worth(self) -> float:
         """What speaks for it, m."""
-        return worth(0.5 * (self.agreeing + self.found), self.contradicted)
+        return worth(0.5 * (self.agreeing + self.found), self.through)
 
 
 @kernel
@@ -166,7 +166,7 @@ class Overlay:
         """Worth at many poses, shape (n, 3), as about so many points of each map have it, m."""
         touching, amid = _sampled(self.first, self.second.points, poses, most)
         found, through = _sampled(self.second, self._near, inverse(poses), most)
-        return np.asarray(SQUARE * (0.5 * (touching + found) - AGAINST * (amid + through)))
+        return worth(0.5 * SQUARE * (touching + found), SQUARE * (amid + through))
 
     def shifted(self, shifts: Floats) -> Floats:
         """Poses of the second map after shifts of its middle and turns about it, rows of m, m, rad."""

@@ -25,13 +25,13 @@ def ties_of(first: Chart, second: Chart, laid: Laid) -> tuple[Tie, ...]:
             continue
         own = hold(contour, cells, aligned.pose)
         covariance = match_covariance(own, aligned.pose, held, np.zeros(3), float(second.frames.blurs[key]))
-        found.append(Tie(anchor, key, aligned.pose, covariance, aligned.overlap, aligned.residual))
+        found.append(Tie(anchor, key, aligned.pose, covariance))
     return tuple(found)
 
 
 def turned_tie(tie: Tie) -> Tie:
     """Give a tie as one of the second map's place to the first one's keyframe."""
-    return Tie(tie.second, tie.first, inverse(tie.pose), _turned(tie.covariance, tie.pose), tie.overlap, tie.residual)
+    return Tie(tie.second, tie.first, inverse(tie.pose), _turned(tie.covariance, tie.pose))
 
 
 def _turned(covariance: Floats, pose: Floats) -> Floats:

@@ -1,5 +1,8 @@
 """What a joint needs, and how far from it two maps are."""
 
+from typing import TypeVar
+
+from contourslam.contour.contours import Floats
 from contourslam.joining.joint import Evidence, Reason
 
 # Each of these alone would be all the doubt that a joint may leave; parts of them add up. Set between maps that are
@@ -16,17 +19,20 @@ ALIKE = 5.0  # m of surfaces; below, two maps have nothing alike
 AGAINST = 2.0  # what a surface that was seen through counts against one that was found, where two ways are compared
 
 
-def worth(agreeing: float, contradicted: float) -> float:
+Metres = TypeVar("Metres", float, Floats)
+
+
+def worth(agreeing: Metres, through: Metres) -> Metres:
     """What speaks for a way of laying one map on another, m, may be negative.
 
     Parameters
     ----------
-    agreeing : float
+    agreeing : float or ndarray
         Length of the surfaces that both have, m.
-    contradicted : float
-        Part of the surfaces of either, where the other has looked, that the other saw through.
+    through : float or ndarray
+        Of the surfaces of either that the other saw through, m.
     """
-    return agreeing * (1.0 - 2.0 * AGAINST * contradicted / max(1.0 - contradicted, 1e-9))
+    return agreeing - AGAINST * through
 
 
 def doubts(evidence: Evidence) -> dict[Reason, float]:
