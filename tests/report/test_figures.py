@@ -13,8 +13,9 @@ from contourslam.report.figures.errors import error_figure, nees_figure
 from contourslam.report.figures.landmarks import landmark_figure
 from contourslam.report.figures.save import save_figure
 from contourslam.report.figures.scan import scan_figure
-from contourslam.report.figures.style import COLOURS, LABELS, colour
+from contourslam.report.figures.style import colour
 from contourslam.report.figures.world import world_figure
+from contourslam.report.naming import COLOURS, LABELS
 from contourslam.report.scan_table import EMPTY_CORNERS, EMPTY_WALLS
 
 

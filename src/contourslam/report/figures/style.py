@@ -9,17 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from contourslam.report.naming import LABELS as LABELS
+from contourslam.report.naming import COLOURS
 from contourslam.report.naming import label as label
+from contourslam.report.svg import colours
 
 P = ParamSpec("P")
 
-BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = (
-    "#0072b2", "#e69f00", "#009e73", "#d55e00", "#aa4499", "#56b4e9", "#f0e442",
-)  # fmt: skip
-INK, GREY, FAINT = "#222222", "#767676", "#c9c9c9"
-
-COLOURS = {"matched_filter": BLUE, "wu": GREEN, "teh_chin": VERMILION, "curvature_scale_space": PURPLE}
+BLUE, ORANGE, GREEN, VERMILION, PURPLE = colours.BLUE, colours.ORANGE, colours.GREEN, colours.VERMILION, colours.PURPLE
+INK, GREY, FAINT, SKY = colours.INK, colours.GREY, colours.FAINT, "#56b4e9"
 _OTHERS = (ORANGE, SKY, INK, GREY)
 
 STYLE: dict[Any, Any] = {
@@ -36,7 +33,7 @@ STYLE: dict[Any, Any] = {
     "axes.labelcolor": INK,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "grid.color": "#e6e6e6",
+    "grid.color": colours.GRID,
     "grid.linewidth": 0.7,
     "text.color": INK,
     "xtick.color": GREY,

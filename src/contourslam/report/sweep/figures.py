@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.report.naming import label
+from contourslam.report.naming import COLOURS, label
 from contourslam.report.svg.axes import Axes
-from contourslam.report.svg.colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
+from contourslam.report.svg.colours import GREY, INK, ORANGE, SKY
 from contourslam.report.svg.drawing import Drawing, drawing
 from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import summary, wheels
@@ -19,7 +19,6 @@ from contourslam.report.sweep.values import Condition, Summary, Sweep
 Floats = NDArray[np.float64]
 AxisName = Literal["noise", "beams"]
 
-_COLOURS = {"matched_filter": BLUE, "wu": GREEN, "teh_chin": VERMILION, "curvature_scale_space": PURPLE}
 _OTHERS = (INK, SKY)
 _WIDTH, _HEIGHT = 400.0, 250.0  # px
 _APART = 0.009
@@ -137,6 +136,6 @@ def _header(title: str, entries: Sequence[tuple[str, str]]) -> tuple[str, float]
 
 def colours(detectors: Sequence[str]) -> dict[str, str]:
     """Colour of each detector: its own for the four of the paper, others in turn."""
-    others = [name for name in detectors if name not in _COLOURS]
+    others = [name for name in detectors if name not in COLOURS]
     more = {name: (*_OTHERS, GREY)[min(k, len(_OTHERS))] for k, name in enumerate(others)}
-    return {name: _COLOURS.get(name) or more[name] for name in detectors}
+    return {name: COLOURS.get(name) or more[name] for name in detectors}
