@@ -153,7 +153,7 @@ def test_time_can_be_drawn_back_stepped_and_followed_again(served) -> None:
 
 
 def test_a_page_that_stops_reading_holds_up_nobody_and_fills_no_memory(served, until) -> None:
-    one, server = served(500, pace=Pace(math.inf))
+    one, server = served(500, pace=Pace(20.0))  # some seconds, so that a busy machine draws several frames too
     with page(server, max_queue=1, close_timeout=0.2) as asleep, page(server) as awake:
         read(asleep)  # hello, and never again
         frames = 0
