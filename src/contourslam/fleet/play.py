@@ -11,7 +11,6 @@ import numpy as np
 from contourslam.config import Config
 from contourslam.fleet.channel import Air
 from contourslam.fleet.common import Joined
-from contourslam.fleet.facts import Answer
 from contourslam.fleet.faults import Fault
 from contourslam.fleet.inbox import Inbox
 from contourslam.fleet.play_robot import Message, Played, Player, Robot
@@ -38,8 +37,6 @@ class Fleet:
         CPU time of the server's.
     solving : float
         CPU time of the maps' last solution.
-    answers : tuple of Answer
-        The last ones.
     restarts : int
         How often the server's program died and began anew.
     """
@@ -50,7 +47,6 @@ class Fleet:
     faults: tuple[Fault, ...]
     seconds: float
     solving: float
-    answers: tuple[Answer, ...]
     restarts: int
 
 
@@ -147,7 +143,6 @@ def play(
     solving = process_time()
     maps = server.server.settle()
     ended = process_time()
-    answers = server.server.answers()
     server.close()
     return Fleet(
         tuple(robot.played for robot in robots),
@@ -156,7 +151,6 @@ def play(
         server.server.faults(),
         server.seconds + solving - before,
         ended - solving,
-        answers,
         server.restarts,
     )
 

@@ -71,11 +71,6 @@ class Run:
         self.begins: list[int] = []
         self._known_from: dict[int, RelationFact] = {}
 
-    @property
-    def name(self) -> str:
-        """Robot and run, for people."""
-        return f"{self.robot}/{self.number:x}"
-
     def take(self, fact: Fact) -> str:
         """Take in the next fact.
 

@@ -21,14 +21,14 @@ KERNEL = 1e-3  # of a robust kernel's width
 FARTHEST = 1e10  # m, s, rad: beyond it a number is none
 MOST_FACTS, MOST_SEEN, MOST_MEMBERS = 10_000, 5_000, 10_000
 
-# Contexts. Of poses three each, of matrices seven: which roots are none, roots, leanings.
+# Contexts. Of poses three each, of matrices six: roots and leanings.
 (FACT, NUMBER, WHEN, BLUR, DRIVE, POINTS, SIGHTINGS, FROM, TO, WIDTH, TIE, ANCHOR, MEMBERS, MEMBER) = range(
     wire_sightings.CONTEXTS, wire_sightings.CONTEXTS + 14
 )
 POSE, RELATIVE, MEMBER_POSE = MEMBER + 1, MEMBER + 4, MEMBER + 7
-INFORMATION = MEMBER + 10  # seven for each kind of relation
+INFORMATION = MEMBER + 10  # six for each kind of relation
 KINDS = 3
-CONTEXTS = INFORMATION + 7 * KINDS
+CONTEXTS = INFORMATION + 6 * KINDS
 # About how many bits the numbers of each context have: else the first few of a message would cost twice as much.
 _SIZES = {
     **{wire_contours.BEARING + n: bits for n, bits in enumerate((1, 2, 4, 4))},
@@ -239,7 +239,7 @@ def _put_relation(writer: Writer, fact: RelationFact, thread: _Thread) -> None:
     writer.put(TO, fact.second - thread.key)
     writer.put(FROM, fact.second - fact.first)
     put_pose(writer, RELATIVE, fact.pose, APART, TURN, np.zeros(3, np.int64))
-    put_matrix(writer, INFORMATION + 7 * kind, fact.information, thread.information[kind])
+    put_matrix(writer, INFORMATION + 6 * kind, fact.information, thread.information[kind])
     thread.key = fact.second
 
 
@@ -251,7 +251,7 @@ def _take_relation(reader: Reader, thread: _Thread) -> RelationFact:
     first = bounded(thread.key - reader.take(FROM))
     pose = take_pose(reader, RELATIVE, APART, TURN, np.zeros(3, np.int64))
     kind = _kind(width, bool(tie))
-    information = take_matrix(reader, INFORMATION + 7 * kind, thread.information[kind])
+    information = take_matrix(reader, INFORMATION + 6 * kind, thread.information[kind])
     robust = (width - 1) * KERNEL if width else math.nan
     return RelationFact(first, thread.key, pose, information, robust, bool(tie))
 
