@@ -9,10 +9,10 @@ from contourslam.config import Config
 from contourslam.contour.contours import Floats
 from contourslam.fleet.channel import Air, Channel
 from contourslam.fleet.facts import Answer
-from contourslam.fleet.reporter import Reporter
+from contourslam.fleet.reporter import Reporter, seen_from
 from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import decode
-from contourslam.geometry.poses import between_one, compose, interpolate
+from contourslam.geometry.poses import compose, interpolate
 from contourslam.graph.slam import GraphSlam
 from contourslam.scan import LaserScan, Odometry, TruePose
 
@@ -158,22 +158,10 @@ class Robot:
             update = self._slam.push_scan(message)
             self.reporter.push(self._slam, update, now)
             memory, placed = self._slam.memory, self.reporter.placed()
-            keyframe = memory.keyframes[-1].local
-            seen = np.zeros(3) if memory.contour is None else between_one(keyframe, memory.contour.pose)
+            last, run = len(memory.keyframes) - 1, self.reporter.run or 0
+            seen, odometry = seen_from(memory, last), self._slam.odometry_pose.copy()
             common, pose = (-1, NOWHERE) if placed is None else (placed.common, placed.pose)
-            last = len(memory.keyframes) - 1
-            self.played.told.append(
-                Told(
-                    now,
-                    message.stamp,
-                    self.reporter.run or 0,
-                    last,
-                    seen,
-                    self._slam.odometry_pose.copy(),
-                    common,
-                    pose,
-                )
-            )
+            self.played.told.append(Told(now, message.stamp, run, last, seen, odometry, common, pose))
             self.speak(now)
 
     def speak(self, now: float) -> None:

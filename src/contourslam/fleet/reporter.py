@@ -251,7 +251,7 @@ class Reporter:
     def _stand(self, update: ScanUpdate, news: News) -> None:
         """Take in where the robot is now."""
         keyframe = len(news.memory.keyframes) - 1
-        seen = _seen(news.memory, keyframe)
+        seen = seen_from(news.memory, keyframe)
         with self._lock:
             outbox, answer = self._outbox, self._answer
             if outbox is not None:
@@ -263,7 +263,7 @@ class Reporter:
             self._placed = placed
 
 
-def _seen(memory: Memory, keyframe: int) -> Floats:
+def seen_from(memory: Memory, keyframe: int) -> Floats:
     """Base seen from a keyframe of this drive, as the contours between the two have it."""
     local = memory.keyframes[keyframe].local
     return np.zeros(3) if memory.contour is None else between_one(local, memory.contour.pose)
@@ -274,7 +274,7 @@ def _place(update: ScanUpdate, answer: Answer, news: News) -> Placed:
     memory, key = news.memory, answer.keyframe
     then, nodes = memory.keyframes[key], memory.landmarks.nodes
     same_drive = then.drive == memory.keyframes[-1].drive
-    seen = _seen(memory, key) if same_drive else between_one(news.poses[key], update.pose)
+    seen = seen_from(memory, key) if same_drive else between_one(news.poses[key], update.pose)
     # What is lost on the way from there: between the two local maps, and within the one that the robot is in.
     noise = turned(memory.doubt.between(nodes[-1], np.array([nodes[key]]), update.pose)[0], -news.poses[key][2])
     active = None if memory.contour is None else memory.contour.active
