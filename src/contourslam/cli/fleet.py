@@ -135,12 +135,12 @@ def _names(paths: tuple[Path, ...]) -> list[str]:
 
 def _tell(metrics: dict[str, Any], folder: Path) -> None:
     """Print what came out."""
+    from contourslam.report.joints import evidence_in_words
+
     for event in metrics["joined"]:
         print(
             f"{event['time']:.1f} s: {', '.join(event['members'])} joined with {', '.join(event['joining'])} by "
-            f"{event['method']}: {event['corners']} corners, {event['walls']} walls, {event['agreeing']:.1f} m of "
-            f"surfaces agree, {event['contradicted']:.1%} contradicted, {event['way']:.1f} m of way, "
-            f"best rival {event['rival']:.0%}"
+            f"{event['method']}: {evidence_in_words(event)}"
         )
     for one in metrics["maps"]:
         print(

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -265,16 +265,17 @@ class Verdict:
     def as_json(self) -> dict[str, Any]:
         """Give the verdict with its evidence."""
         from contourslam.joining.joint import Joint
+        from contourslam.report.joints import joint_figures
 
         told: dict[str, Any] = {"maps": self.names}
         if isinstance(self.found, int):
             return told | {"joined": True, "shared_keyframes": self.found}
         if isinstance(self.found, Joint):
-            told |= {"joined": self.left_out is None, **_joint_json(self.found)}
+            told |= {"joined": self.left_out is None, **joint_figures(self.found)}
             if self.left_out is not None:
                 told |= {"reason": "contradicts others", "off": self.left_out.off, "sigma": self.left_out.sigma}
             return told
-        best = None if self.found.best is None else _joint_json(self.found.best)
+        best = None if self.found.best is None else joint_figures(self.found.best)
         return told | {"joined": False, "reason": self.found.reason, "best": best}
 
     def __str__(self) -> str:
@@ -294,15 +295,9 @@ class Verdict:
 
 
 def _evidence(joint: "Joint") -> str:
-    evidence = joint.evidence
-    return (
-        f"{evidence.corners} corners, {evidence.walls} walls, {evidence.agreeing:.1f} m of surfaces agree, "
-        f"{evidence.contradicted:.1%} contradicted, {evidence.way:.1f} m of way, best rival {evidence.rival:.0%}"
-    )
+    from contourslam.report.joints import evidence_in_words, joint_figures
 
-
-def _joint_json(joint: "Joint") -> dict[str, Any]:
-    return {"method": joint.method, "pose": joint.pose, "ties": len(joint.ties), **asdict(joint.evidence)}
+    return evidence_in_words(joint_figures(joint))
 
 
 def _print(pairs: list[Verdict], told: list[dict[str, Any]], alone: list[str], output: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contourslam import __version__
 from contourslam.atomic import make_folder, remove, write_text
+from contourslam.display import metres
 from contourslam.fleet.play import Fleet
 from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import NAME
@@ -21,6 +22,8 @@ from contourslam.report.page.markup import Cell, Row, Section, page, paragraph, 
 from contourslam.report.result_folder import to_json
 from contourslam.report.svg.drawing import Drawing
 from contourslam.report.svg.merged import merged_drawing
+
+_ERRORS = "rmse", "online_rmse", "odometry_rmse"
 
 
 def map_file(shared: Shared) -> str:
@@ -126,9 +129,8 @@ def _headline(robots: list[dict[str, Any]], together: int) -> str:
     errors = [(robot["rmse"], robot["odometry_rmse"]) for robot in robots if robot["rmse"] is not None]
     if errors:
         raw = max(odometry for _, odometry in errors)
-        shown.append(
-            (_metres(max(error for error, _ in errors)), "worst robot's error", f"raw odometry {_metres(raw)}")
-        )
+        worst = metres(max(error for error, _ in errors))
+        shown.append((worst, "worst robot's error", f"raw odometry {metres(raw)}"))
     most = max((robot["bytes_per_second"] for robot in robots), default=0.0)
     shown.append((f"{most:.0f} B/s", "most that a robot sent", "without the transport's own"))
     return tiles(shown)
@@ -157,7 +159,7 @@ def _robots(robots: list[dict[str, Any]]) -> Section:
             robot["name"],
             [
                 Cell(str(robot["common"])),
-                *(Cell(_metres(robot[error])) for error in ("rmse", "online_rmse", "odometry_rmse")),
+                *(Cell("-" if robot[error] is None else metres(robot[error])) for error in _ERRORS),
                 Cell("-" if robot["told_from"] is None else f"{robot['told_from']:.0f} s"),
                 Cell(str(robot["messages"])),
                 Cell(f"{robot['bytes_per_second']:.0f}"),
@@ -216,9 +218,3 @@ def _faults(faults: list[dict[str, Any]]) -> Section | None:
     rows = [Row(fault["robot"] or "server", [Cell(f"{fault['run']:x}"), Cell(fault["text"])]) for fault in faults]
     words = paragraph("What robots told and could not be used, or was wrong with what the server had kept.")
     return Section("faults", "Faults", words + table("Faults, the newest last", ["who", "run", "what"], rows))
-
-
-def _metres(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"{1e3 * value:.1f} mm" if value < 0.1 else f"{value:.2f} m"

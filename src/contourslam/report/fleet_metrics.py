@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from contourslam.contour.contours import Floats
+from contourslam.evaluation.errors import align_first
 from contourslam.evaluation.fleet import fit, met, rmse
 from contourslam.fleet.common import Joined
 from contourslam.fleet.play import Fleet
 from contourslam.fleet.play_robot import Played
 from contourslam.fleet.shared import Shared
-from contourslam.geometry.poses import between, compose
+from contourslam.report.joints import joint_figures
 
 
 def fleet_metrics(fleet: Fleet) -> dict[str, Any]:
@@ -104,7 +105,7 @@ def _odometry(robot: Played) -> float:
     """Error of the raw odometry, the first pose being the true one, m."""
     raw = np.array([each.odometry for each in robot.told])
     truth = robot.true(np.array([each.time for each in robot.told]))
-    return rmse(compose(truth[0], between(raw[0], raw)), truth, np.zeros(3))
+    return rmse(align_first(raw, truth), truth, np.zeros(3))
 
 
 def _or_none(value: float) -> float | None:
@@ -112,16 +113,12 @@ def _or_none(value: float) -> float | None:
 
 
 def _of_joined(event: Joined) -> dict[str, Any]:
-    joint = event.joint
     return {
         "time": event.at,
         "common": event.kept,
         "members": event.members,
         "joining": event.joining,
-        "method": joint.method,
-        "ties": len(joint.ties),
-        "pose": joint.pose,
-        **asdict(joint.evidence),
+        **joint_figures(event.joint),
     }
 
 
