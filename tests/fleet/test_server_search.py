@@ -3,12 +3,16 @@
 import math
 
 import numpy as np
+import pytest
 
+from contourslam.fleet import server_search
 from contourslam.fleet.common import CommonMap
 from contourslam.fleet.facts import KeyframeFact, RelationFact
 from contourslam.fleet.runs import Run
-from contourslam.fleet.server_search import LAG, Search
+from contourslam.fleet.server_search import CAREFUL, LAG, Search
 from contourslam.joining.chart import WAY
+from contourslam.joining.joint import Evidence, Joint, Tie
+from contourslam.joining.verdict import hurdle
 
 
 def grow(run: Run, count: int) -> None:
@@ -43,3 +47,21 @@ def test_robots_that_meet_late_in_long_drives_are_looked_for_where_they_meet() -
     assert max(lacking) < LAG  # a tenth of it would be 30
     assert 0.4 * LAG < WAY
     assert lacking.count(0) > len(lacking) // 6  # and again and again nothing at all
+
+
+@pytest.mark.parametrize(("agreeing", "careful"), [(70.0, True), (40.0, False)])
+def test_who_asks_again_and_again_joins_only_what_is_far_from_doubtful(
+    monkeypatch: pytest.MonkeyPatch, agreeing: float, careful: bool
+) -> None:
+    runs = Run("one", 1), Run("other", 1)
+    commons = tuple(CommonMap(number, [run]) for number, run in enumerate(runs, 1))
+    for run, common in zip(runs, commons, strict=True):
+        grow(run, 30)
+        common.advance()
+    evidence = Evidence(0, 10, agreeing, 0.0, 20.0, 0.3)
+    assert hurdle(evidence) < 1.0  # two maps that are asked about once would be joined
+    assert (hurdle(evidence) < CAREFUL) == careful
+    found = Joint(np.zeros(3), (Tie(3, 4, np.zeros(3), 1e-4 * np.eye(3)),), evidence, "search")
+    monkeypatch.setattr(server_search, "decide", lambda *_: found)
+    joined = Search()._decide(*commons, [])
+    assert (joined is not None) == careful

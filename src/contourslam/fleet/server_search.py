@@ -15,11 +15,13 @@ from contourslam.joining.chart import WAY, Chart
 from contourslam.joining.find import LIKELY, decide
 from contourslam.joining.joint import Apart, Joint
 from contourslam.joining.looks import Look, Method, look, turned_round
+from contourslam.joining.verdict import hurdle
 
 LATER = 10  # a chart is drawn anew when one keyframe has come for so many that are in it,
 LAG = 16  # or so many: about the way of one view, that no two robots meet in what neither chart holds
 SURE = 5.0  # log-odds of a look after which two common maps are judged at once;
 SELDOM = 2  # else when they have so many views that may be alike, and one more for so many that they were judged by
+CAREFUL = 0.75  # of the hurdle that a joint may be at: who asks again as maps grow gives chance as many chances
 MOST_SIGHTS = 200  # kept of two common maps that stay apart; of more, the older half is given up
 MOST_WAITING = 20_000  # views that wait to be looked for; of more the oldest are given up
 
@@ -160,7 +162,7 @@ class Search:
         older, younger = sorted((own, other), key=lambda common: common.number)
         first, second = self._draw(older, sights), self._draw(younger, sights)
         joint = decide(first.chart, second.chart, list(_laid(sights, first, second)))
-        if isinstance(joint, Apart) or not joint.ties:
+        if isinstance(joint, Apart) or not joint.ties or hurdle(joint.evidence) > CAREFUL:
             if len(sights) > MOST_SIGHTS:
                 del sights[: len(sights) // 2]
             return None
