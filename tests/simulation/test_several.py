@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -25,6 +25,7 @@ from contourslam.simulation.rooms import ROOMS
 from contourslam.simulation.senses import Eyes, Message, Past
 from contourslam.simulation.several import SeveralRobots
 from contourslam.simulation.simulate import simulate
+from contourslam.simulation.traffic import Traffic
 from contourslam.simulation.world import compile_world
 
 ROBOT = RobotModel()
@@ -122,6 +123,30 @@ def test_on_their_wheels_robots_keep_off_each_other_and_off_everything(
     assert nearest(ways) > BODIES + 0.05
     for height in (0.02, 0.1):
         assert clearance(ways[:, ::20, :2].reshape(-1, 2), *outlines(ROOMS[name], height)).min() > BODIES / 2 + 0.04
+
+
+def test_each_robot_claims_the_way_that_it_needs_at_its_own_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    class Watched(Traffic):
+        def limits(self, at: Sequence[int], speeds: Sequence[float]) -> list[float]:
+            asked.append(speeds)
+            return super().limits(at, speeds)
+
+    monkeypatch.setattr("contourslam.simulation.several.Traffic", Watched)
+    robots = SeveralRobots(ROOMS["large_hall"], SimulationConfig(duration=0.1), 0, 3, contact_free=True)
+    assert len(list(robots.moments())) > 1
+    assert asked[0] == robots.speeds
+    assert asked[0][1] < asked[0][0] == robots.config.speed
+
+
+def test_a_robot_that_starts_at_the_end_of_a_lap_starts_on_it() -> None:
+    robots = SeveralRobots(ROOMS["large_hall"], SimulationConfig(duration=0.1), 2, 6, contact_free=True)
+    assert all(driver.index < len(way.points) for (driver, _), way in zip(robots.drivers(), robots.ways, strict=True))
+    assert all(
+        np.hypot(*(way.points - start[:2]).T).min() < 0.04
+        for start, way in zip(robots.starts, robots.ways, strict=True)
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))

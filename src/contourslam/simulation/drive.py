@@ -173,7 +173,7 @@ def take_place(
     pose : tuple of float
         Of the base: x (m), y (m), heading (rad).
     """
-    first += int(chance.integers(0, 40))
+    first = (first + int(chance.integers(0, 40))) % len(route)
     along = route[(first + 5) % len(route)] - route[first]
     heading = math.atan2(along[1], along[0]) + chance.uniform(-0.05, 0.05)
     sideways = chance.uniform(-0.03, 0.03)

@@ -52,6 +52,8 @@ class SeveralRobots:
     ways : list of Way
     starts : list of (x, y, heading)
         m, m, rad.
+    speeds : list of float
+        At which each likes to go, m/s.
 
     Raises
     ------
@@ -75,7 +77,7 @@ class SeveralRobots:
         self.duration = DURATION if config.duration is None else config.duration
         speeds = config.speed * stream(seed, TRAFFIC).uniform(_SLOWEST, 1.0, robots)
         speeds[:1] = config.speed
-        self._speeds: list[float] = speeds.tolist()
+        self.speeds: list[float] = speeds.tolist()
         self.ways, self._firsts = ways_of(place, robots, 1.2 * config.speed * self.duration + 10.0, seed)
         self.starts = [start for _, start in self.drivers()]
         self.contact_free = contact_free
@@ -84,7 +86,7 @@ class SeveralRobots:
         """Give each robot a new driver, at its start."""
         return [
             take_place(way.points, first, speed, stream(seed, DRIVER))
-            for way, first, speed, seed in zip(self.ways, self._firsts, self._speeds, self.seeds, strict=True)
+            for way, first, speed, seed in zip(self.ways, self._firsts, self.speeds, self.seeds, strict=True)
         ]
 
     @property
@@ -152,7 +154,7 @@ class _Helm:
     def __init__(self, robots: SeveralRobots) -> None:
         self._drivers = [driver for driver, _ in robots.drivers()]
         self._traffic = Traffic(robots.ways, [driver.index for driver in self._drivers])
-        self._room, self._speeds = robots.room.name, [robots.config.speed] * len(self._drivers)
+        self._room, self._speeds = robots.room.name, robots.speeds
         self._since = [(driver.index, 0.0) for driver in self._drivers]
 
     def steer(self, moments: Moments, tick: int) -> list[tuple[float, float]]:
