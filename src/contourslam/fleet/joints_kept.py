@@ -2,13 +2,18 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from contourslam.fleet.common import CommonMap
+from contourslam.fleet.faults import Faults
+from contourslam.fleet.inbox import Source
+from contourslam.fleet.runs import Run
 from contourslam.joining.joint import Evidence, Joint, Tie
 
 NAME = "joints.jsonl"
@@ -39,6 +44,85 @@ class KeptJoint:
         ends = zip(self.joint.ties, map(first, self.first), map(second, self.second), strict=True)
         ties = (replace(tie, first=a, second=b) for tie, a, b in ends if a is not None and b is not None)
         return replace(self.joint, ties=tuple(ties))
+
+
+class Joints:
+    """The joints of a server: kept as they are made, and those from before its begin given back; changed in place.
+
+    Parameters
+    ----------
+    folder : Path or None
+        None keeps nothing.
+    faults : Faults
+        Hear of what the disk refuses.
+    """
+
+    def __init__(self, folder: Path | None, faults: Faults) -> None:
+        self._folder, self._faults = folder, faults
+        self._before: list[KeptJoint] = []
+        if folder is not None:
+            try:
+                self._before += kept_joints(folder)
+            except OSError as error:
+                faults.note(f"the joints that were kept cannot be read ({error}); they are looked for")
+
+    def __len__(self) -> int:
+        """Give the number of those from before that wait to be given back."""
+        return len(self._before)
+
+    def keep(self, at: float, joint: Joint, older: CommonMap, younger: CommonMap) -> None:
+        """Keep a joint of two common maps, its ties being in the numbers of their keyframes."""
+        if self._folder is None:
+            return
+        first = _owners(older, [tie.first for tie in joint.ties])
+        second = _owners(younger, [tie.second for tie in joint.ties])
+        try:
+            keep_joint(self._folder, KeptJoint(at, joint, first, second))
+        except OSError as error:
+            self._faults.note(f"a joint cannot be kept ({error}); it is looked for again after a restart")
+
+    def again(
+        self, runs: Mapping[Source, Run], where: Mapping[Run, CommonMap]
+    ) -> Iterator[tuple[CommonMap, CommonMap, Joint, float]]:
+        """Give what was joined before, each once, as the common maps are when it is asked for.
+
+        Parameters
+        ----------
+        runs : mapping of (str, int) to Run
+        where : mapping of Run to CommonMap
+            That each run belongs to.
+
+        Yields
+        ------
+        CommonMap, CommonMap
+            The older, and the younger that went into it.
+        Joint
+            In the numbers of their keyframes.
+        float
+            s, when it was made.
+        """
+
+        def common_of(owner: Owner) -> CommonMap | None:
+            run = runs.get(owner[:2])
+            return None if run is None else where.get(run)
+
+        def key(common: CommonMap, owner: Owner) -> int | None:
+            placed = common_of(owner) is common and owner[2] < len(runs[owner[:2]].keys)
+            return runs[owner[:2]].keys[owner[2]] if placed else None
+
+        kept, self._before = self._before, []
+        for each in kept:
+            older, younger = common_of(each.first[0]), common_of(each.second[0])
+            if older is None or younger is None or older.number >= younger.number:
+                continue
+            joint = each.renumbered(partial(key, older), partial(key, younger))
+            if joint.ties:
+                yield older, younger, older.laid_by(joint, younger), each.at
+
+
+def _owners(common: CommonMap, keys: list[int]) -> tuple[Owner, ...]:
+    """Give keyframes of a common map in the numbers of their runs."""
+    return tuple((run.robot, run.number, number) for run, number in (common.owners[key] for key in keys))
 
 
 def keep_joint(folder: Path, kept: KeptJoint) -> None:

@@ -2,23 +2,19 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
 from time import perf_counter
 
-import numpy as np
-
 from contourslam.config import Config
-from contourslam.contour.contours import Floats
 from contourslam.errors import JournalError
 from contourslam.fleet.common import CommonMap, Joined
 from contourslam.fleet.common_kept import refined
 from contourslam.fleet.facts import Answer, KeyframeFact, Report
 from contourslam.fleet.faults import Fault, Faults, briefly
 from contourslam.fleet.inbox import Inbox, Source
-from contourslam.fleet.joints_kept import KeptJoint, Owner, keep_joint, kept_joints
+from contourslam.fleet.joints_kept import Joints
 from contourslam.fleet.runs import Identity, Run
+from contourslam.fleet.server_answers import NOWHERE, Standing, standings
 from contourslam.fleet.server_search import Search
 from contourslam.fleet.shared import Shared, share
 from contourslam.joining.joint import Joint
@@ -26,20 +22,6 @@ from contourslam.joining.joint import Joint
 LATEST = 1.0  # s after which keyframes that wait enter the graph, however few
 GROWN = 1.5  # a common map that has grown so much since it was last solved as a whole is solved again
 FEWEST = 60  # keyframes of a common map that is worth it
-
-
-@dataclass(frozen=True, slots=True)
-class _Placed:
-    """What an answer says of a run, but for what is received."""
-
-    common: int
-    members: tuple[str, ...]
-    keyframe: int
-    pose: Floats
-    covariance: Floats
-
-
-NOWHERE = _Placed(-1, (), -1, np.zeros(3), np.zeros((3, 3)))
 
 
 class FleetServer:
@@ -89,7 +71,7 @@ class FleetServer:
         self._faults = Faults()
         for trouble in self._inbox.troubles:
             self._faults.note(trouble)
-        self._placed: dict[Source, _Placed] = {}
+        self._placed: dict[Source, Standing] = {}
         # All that follows is touched by the thread that ticks alone.
         self._commons: dict[int, CommonMap] = {}
         self._runs: dict[Source, Run] = {}
@@ -97,7 +79,7 @@ class FleetServer:
         self._numbers = 0
         self._since: dict[int, float] = {}  # common maps in which keyframes wait, and since when
         self._solved: dict[int, int] = {}  # keyframes of each when it was solved as a whole
-        self._rejoined = list(self._kept_joints())  # that wait for their runs
+        self._joints = Joints(self._inbox.folder, self._faults)
         self._known: dict[Identity, Run] = {}  # who told of each keyframe first
         self._aside: set[Source] = set()
         self.search = Search()
@@ -229,41 +211,17 @@ class FleetServer:
     def _site(self, common: CommonMap) -> str | None:
         return self._sites.get(common.runs[0].robot)
 
-    def _kept_joints(self) -> Iterator[KeptJoint]:
-        if self._inbox.folder is not None:
-            try:
-                yield from kept_joints(self._inbox.folder)
-            except OSError as error:
-                self._faults.note(f"the joints that were kept cannot be read ({error}); they are looked for")
-
     def _join_again(self) -> None:
         """Join what was joined before this process began."""
-        if not self._rejoined:
+        if not len(self._joints):
             return
         for common in list(self._commons.values()):
             self._advance(common)
-        for kept in self._rejoined:
-            older, younger = self._common_of(kept.first[0]), self._common_of(kept.second[0])
-            if older is None or younger is None or older.number >= younger.number:
-                continue
-            if self._site(older) != self._site(younger):
-                continue
-            joint = kept.renumbered(partial(self._key, older), partial(self._key, younger))
-            if joint.ties:
-                self._join(older, younger, older.laid_by(joint, younger), kept.at, keep=False)
-        self._rejoined = []
-
-    def _common_of(self, owner: Owner) -> CommonMap | None:
-        run = self._runs.get(owner[:2])
-        return None if run is None else self._where.get(run)
-
-    def _key(self, common: CommonMap, owner: Owner) -> int | None:
-        run = self._runs.get(owner[:2])
-        placed = run is not None and self._where.get(run) is common and owner[2] < len(run.keys)
-        return run.keys[owner[2]] if run is not None and placed else None
+        for older, younger, joint, at in self._joints.again(self._runs, self._where):
+            if self._site(older) == self._site(younger):
+                self._join(older, younger, joint, at, keep=False)
 
     def _join(self, older: CommonMap, younger: CommonMap, joint: Joint, now: float, *, keep: bool = True) -> None:
-        kept = KeptJoint(now, joint, *_owners(older, younger, joint))
         event = Joined(now, older.number, younger.number, older.members, younger.members, joint)
         try:
             older.absorb(younger, joint)
@@ -272,11 +230,8 @@ class FleetServer:
             self._put_aside(younger, error)
             return
         older.joined += (event,)
-        if keep and self._inbox.folder is not None:
-            try:
-                keep_joint(self._inbox.folder, kept)
-            except OSError as error:
-                self._faults.note(f"a joint cannot be kept ({error}); it is looked for again after a restart")
+        if keep:
+            self._joints.keep(now, joint, older, younger)
         del self._commons[younger.number]
         for run in younger.runs:
             self._where[run] = older
@@ -325,27 +280,14 @@ class FleetServer:
 
     def _place(self) -> None:
         """Let the answers know where each run is now."""
-        placed: dict[Source, _Placed] = {}
+        placed: dict[Source, Standing] = {}
         for common in list(self._commons.values()):
             try:
-                placed.update(self._places_of(common))
+                placed.update(standings(common, self._placed))
             except Exception as error:
                 self._put_aside(common, error)
         with self._lock:
             self._placed = placed
-
-    def _places_of(self, common: CommonMap) -> dict[Source, _Placed]:
-        placed, members = {}, common.members
-        for run in common.runs:
-            last = len(run.keys) - 1
-            if last < 0:
-                continue
-            before = self._placed.get((run.robot, run.number), NOWHERE)
-            pose = common.pose(run, last)
-            same = before.keyframe == last and before.common == common.number
-            covariance = before.covariance if same else common.covariance(run, last)
-            placed[run.robot, run.number] = _Placed(common.number, members, last, pose, covariance)
-        return placed
 
     def answers(self) -> tuple[Answer, ...]:
         """Give an answer for each run that was ever heard of, from any thread.
@@ -357,13 +299,8 @@ class FleetServer:
         """
         self._inbox.settle()  # the disk may take its time; messages go on coming in
         with self._lock:
-            return tuple(self._answer(source) for source in self._inbox.sources)
-
-    def _answer(self, source: Source) -> Answer:
-        at = self._placed.get(source, NOWHERE)
-        received, missing = self._inbox.state(source)
-        members = at.members or source[:1]
-        return Answer(*source, received, missing, at.common, members, at.keyframe, at.pose, at.covariance)
+            placed, state = self._placed, self._inbox.state
+            return tuple(placed.get(s, NOWHERE).answer(s, *state(s)) for s in self._inbox.sources)
 
     def joined(self) -> tuple[Joined, ...]:
         """Tell which common maps became one, the earliest first; in the thread that ticks."""
@@ -381,11 +318,3 @@ class FleetServer:
     def settle(self) -> tuple[Shared, ...]:
         """Solve all common maps as a whole, and give them; in the thread that ticks."""
         return tuple(self.solve(common.number) for common in list(self._commons.values()) if len(common))
-
-
-def _owners(older: CommonMap, younger: CommonMap, joint: Joint) -> Iterator[tuple[Owner, ...]]:
-    """Give the keyframes of both sides of a joint's ties, in the numbers of their runs."""
-    sides = (older, [tie.first for tie in joint.ties]), (younger, [tie.second for tie in joint.ties])
-    for common, keys in sides:
-        owners = (common.owners[key] for key in keys)
-        yield tuple((run.robot, run.number, number) for run, number in owners)
