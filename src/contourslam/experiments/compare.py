@@ -1,7 +1,7 @@
 """The paper's experiment: one run through a furnished room, recorded once, replayed once per detector; over seeds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -148,10 +148,7 @@ def compare(
         If the recording cannot be written.
     """
     simulation = simulation or SimulationConfig()
-    lidar = simulation.lidar
-    if simulation.noise is not None:
-        lidar = replace(lidar, sigma_range=simulation.noise, sigma_relative=0.0)
-    config = told(config or Config(back_end="ekf"), lidar)
+    config = told(config or Config(back_end="ekf"), simulation.measuring_lidar)
     wanted = tuple(variants(detectors))
     tasks = [
         _Task(room, seed, wanted, config, simulation, None if i else recording, keep=i == 0)

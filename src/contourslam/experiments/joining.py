@@ -7,14 +7,12 @@ from time import thread_time
 import numpy as np
 from numpy.typing import NDArray
 
-from contourslam.experiments.joinable_maps import (
-    Mapped,
-)
+from contourslam.experiments.joinable_maps import Mapped
 from contourslam.geometry.poses import between
-from contourslam.joining.chart import Chart
 from contourslam.joining.find import find_joint
 from contourslam.joining.joint import Apart, Evidence
 from contourslam.joining.verdict import hurdle
+from contourslam.localization.known_map import KnownMap
 from contourslam.maps.saved_map import Contoured, SavedMap
 
 Floats = NDArray[np.float64]
@@ -112,8 +110,7 @@ def piece(whole: Mapped, start: float, end: float) -> Mapped:
 
 def _near(saved: SavedMap) -> SavedMap:
     """The map without corners and walls that none of its contours touches."""
-    chart = Chart(saved)
-    spots = chart.known.points[:, :2]
+    spots = KnownMap(saved).points[:, :2]
 
     def touched(places: Floats) -> NDArray[np.bool_]:
         return np.array([np.hypot(*(spots - place).T).min() < NEAR for place in places], np.bool_)

@@ -79,6 +79,10 @@ class LidarModel:
             if not 0 <= value < math.inf:
                 raise ConfigError(f"LidarModel.{name} must be zero or more, got {value!r}")
 
+    def with_noise(self, sigma: float | None) -> "LidarModel":
+        """The same lidar with this standard deviation (m) of every range, near or far; None leaves its own noise."""
+        return self if sigma is None else replace(self, sigma_range=sigma, sigma_relative=0.0)
+
 
 PAPER_LIDAR = LidarModel()
 """500 beams over 360 degrees at 10 Hz, counter-clockwise from -pi, 1 cm of noise, ahead of the axle as in eq. 30."""
@@ -170,9 +174,7 @@ class SimulationConfig:
     @property
     def measuring_lidar(self) -> LidarModel:
         """The lidar with the noise that is asked for in place of its own."""
-        if self.noise is None:
-            return self.lidar
-        return replace(self.lidar, sigma_range=self.noise, sigma_relative=0.0)
+        return self.lidar.with_noise(self.noise)
 
     def __post_init__(self) -> None:
         if self.duration is not None and not 0.1 <= self.duration < math.inf:

@@ -21,7 +21,8 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 _LEAST_DURATION, _LEAST_LAPS = 180.0, 2.05
 _LONGEST_DURATION = 3600.0
-_PATIENCE = 10.0  # s without getting on along the route, after which the robot counts as stuck
+PATIENCE = 10.0
+"""Without getting on though the way is free, a robot counts as stuck after so long, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,7 @@ def drive(
         ticks += 1
         if follower.laps > laps:
             laps, advanced = follower.laps, time
-        elif time - advanced > _PATIENCE:
+        elif time - advanced > PATIENCE:
             x, y, _ = moments[-1].poses[-1, 0]
             raise ConfigError(
                 f"room {room.name}: the robot got stuck at ({x:.2f}, {y:.2f}) m after {advanced:.0f} s; "

@@ -11,7 +11,7 @@ from contourslam.geometry.rigid import from_planar
 from contourslam.simulation.buildings import Building
 from contourslam.simulation.chance import DRIVER, TRAFFIC, seed_of, stream
 from contourslam.simulation.config import SimulationConfig
-from contourslam.simulation.drive import take_place
+from contourslam.simulation.drive import PATIENCE, take_place
 from contourslam.simulation.follower import Follower
 from contourslam.simulation.gliding import Gliding
 from contourslam.simulation.lanes import ways_of
@@ -25,7 +25,6 @@ Floats = NDArray[np.float64]
 DURATION = 180.0
 """Length of a drive of several robots where none is asked for, s."""
 _SLOWEST = 0.8  # of the speed asked for, at which a robot goes
-_PATIENCE = 10.0  # s without getting on though the way is free, after which a robot counts as stuck
 
 
 class SeveralRobots:
@@ -167,7 +166,7 @@ class _Helm:
             before, since = self._since[robot]
             if index > before or limit == 0.0:
                 self._since[robot] = index, time
-            elif time - since > _PATIENCE:
+            elif time - since > PATIENCE:
                 x, y, _ = moments.last_pose(robot)
                 raise ConfigError(f"room {self._room}: robot {robot + 1} got stuck at ({x:.2f}, {y:.2f}) m")
         return [

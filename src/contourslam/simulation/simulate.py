@@ -75,7 +75,7 @@ class SimulatedRun:
         seed : int, optional
             Of the noise; by default the run's own.
         """
-        lidar = replace(self.lidar, sigma_range=sigma, sigma_relative=0.0)
+        lidar = self.lidar.with_noise(sigma)
         noise_seed = self.seed if seed is None else seed
         return replace(self, lidar=lidar, scans=add_noise(self.ideal_scans, lidar, noise_seed))
 
@@ -128,10 +128,8 @@ def simulate(room: Room, config: SimulationConfig, seed: int, *, progress: Progr
     )
     odometry = read_odometry(driven, config.robot, seed)
     ideal = cast_scans(room, driven, config.lidar, seed, progress=_part(progress, 0.5, 1.0))
-    run = SimulatedRun(room, config.lidar, seed, driven, odometry, ideal, ())
-    if config.noise is not None:
-        return run.with_noise(config.noise)
-    return replace(run, scans=add_noise(ideal, config.lidar, seed))
+    lidar = config.measuring_lidar
+    return SimulatedRun(room, lidar, seed, driven, odometry, ideal, add_noise(ideal, lidar, seed))
 
 
 def _part(progress: Progress | None, first: float, last: float) -> Progress | None:

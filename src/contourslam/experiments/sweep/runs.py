@@ -50,7 +50,7 @@ class SimulatedDrive:
         lidar = LIDARS[self.lidar]
         if self.beams is not None:
             lidar = replace(lidar, samples_per_second=self.beams * lidar.turn_rate)
-        return lidar if self.noise is None else replace(lidar, sigma_range=self.noise, sigma_relative=0.0)
+        return lidar.with_noise(self.noise)
 
     @property
     def simulation(self) -> SimulationConfig:

@@ -143,8 +143,7 @@ def simulated(where: SimulatedDrive) -> Material:
     """
     lidar = where.model
     driven, odometry = _driven(where.room, where.seed, where.speed, where.duration)
-    noiseless = replace(lidar, sigma_range=0.0, sigma_relative=0.0)
-    ideal = _ideal_scans(where.room, where.seed, where.speed, where.duration, noiseless)
+    ideal = _ideal_scans(where.room, where.seed, where.speed, where.duration, lidar.with_noise(0.0))
     scans = add_noise(ideal, lidar, where.seed)
     run = SimulatedRun(ROOMS[where.room], lidar, where.seed, driven, odometry, (), scans)
     x, y, yaw = run.lidar_mount.tolist()
