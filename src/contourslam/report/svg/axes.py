@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from contourslam.report.svg import paths
 from contourslam.report.svg.colours import FAINT, GREY, GRID, SHADES
+from contourslam.report.svg.legend import LEFT, RIGHT, entry, entry_width, written
 from contourslam.report.svg.ticks import decades, ticks
 
 Floats = NDArray[np.float64]
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 14.0, 24.0, 42.0  # px around the axes
+_TOP, _BOTTOM = 24.0, 42.0  # px above and below the axes
 _FARTHEST = 16_000.0  # px; viewers cannot draw what lies much farther out
 
 
@@ -58,7 +59,7 @@ class Axes:
         self.width, self.height = width, height
         self._log = logarithmic
         self._x, self._y = x, self._scaled(np.array(y, dtype=np.float64))
-        self._left, self._top = offset[0] + _LEFT, offset[1] + _TOP
+        self._left, self._top = offset[0] + LEFT, offset[1] + _TOP
         self._inside: list[str] = []
         self._outside: list[str] = []
         self._labels, self._unit, self._digits = labels, unit, digits
@@ -66,7 +67,7 @@ class Axes:
     @property
     def outer(self) -> tuple[float, float]:
         """Width and height with all that is around the axes, px."""
-        return self.width + _LEFT + _RIGHT, self.height + _TOP + _BOTTOM
+        return self.width + LEFT + RIGHT, self.height + _TOP + _BOTTOM
 
     def _scaled(self, y: Floats) -> Floats:
         return np.log10(np.maximum(y, 1e-12)) if self._log else y
@@ -157,13 +158,9 @@ class Axes:
         left, marks = self._left, []
         for name, colour, *rest in entries:
             layer, shown = rest or ("", True)
-            mark = (
-                f'<path d="M{left:.0f} {self._top - 12:.0f}h16" stroke="{colour}" stroke-width="4"/>'
-                f"{_text(left + 21, self._top - 8, name, 'start')}"
-            )
             of = f' data-of="{layer}"' if layer else ""
-            marks.append(f"<g{of}{'' if shown else _HIDDEN}>{mark}</g>")
-            left += 36.0 + 6.6 * len(name) if shown else 0.0
+            marks.append(f"<g{of}{'' if shown else _HIDDEN}>{entry(left, self._top - 8, name, colour)}</g>")
+            left += entry_width(name) if shown else 0.0
         self._outside.append('<g data-legend="">' + "".join(marks) + "</g>")
 
     def _by_colour(
@@ -195,11 +192,11 @@ class Axes:
         for value in ticks(*self._x):
             at = float(self.pixels(np.array([value]), np.ones(1))[0, 0])
             grid.append(f"M{at:.1f} {top:.1f}V{bottom:.1f}")
-            words.append(_text(at, bottom + 16, f"{value:g}", "middle"))
+            words.append(written(at, bottom + 16, f"{value:g}", "middle"))
         for value in decades(*self._y) if self._log else ticks(*self._y):
             at = float(self.pixels(np.zeros(1), np.array([value]))[0, 1])
             grid.append(f"M{left:.1f} {at:.1f}H{right:.1f}")
-            words.append(_text(left - 7, at + 4, f"{value:g}", "end"))
+            words.append(written(left - 7, at + 4, f"{value:g}", "end"))
         turned = f"translate({left - 46:.1f} {top + 0.5 * self.height:.1f}) rotate(-90)"
         frame = f'x="{left:.1f}" y="{top:.1f}" width="{self.width:.1f}" height="{self.height:.1f}"'
         box = f"{left:.1f} {top:.1f} {self.width:.1f} {self.height:.1f}"
@@ -231,8 +228,8 @@ class Axes:
             parts.append(f'<rect {box} fill="{shade}"/>')
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             value = low * (high / low) ** share
-            parts.append(_text(left + 17, top + height * (1.0 - share) + 4, f"{value:.2g}", "start"))
-        parts.append(_text(left - 8, top - 12, label, "start"))
+            parts.append(written(left + 17, top + height * (1.0 - share) + 4, f"{value:.2g}", "start"))
+        parts.append(written(left - 8, top - 12, label, "start"))
         self._outside.append(f'<g data-scale="{layer}">' + "".join(parts) + "</g>")
 
 
@@ -245,7 +242,3 @@ def _named(name: str) -> str:
 
 def _span(span: tuple[float, float] | Floats) -> str:
     return f"{span[0]:.9g} {span[1]:.9g}"
-
-
-def _text(x: float, y: float, text: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'

@@ -2,11 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from contourslam.report.svg.axes import Axes
 from contourslam.report.svg.colours import INK, SHEET
 
 SCALE_WIDTH = 96.0  # px that a scale of shades takes beside its axes
+
+
+class Panel(Protocol):
+    """A part of a drawing, as wide as the drawing or less."""
+
+    @property
+    def outer(self) -> tuple[float, float]:
+        """Width and height with all that is around it, px."""
+
+    def svg(self) -> str:
+        """Give all of it as SVG elements, at its place in the drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +37,7 @@ class Drawing:
     height: int
 
 
-def drawing(panels: Sequence[Axes], *, beside: float = 0.0) -> Drawing:
+def drawing(panels: Sequence[Panel], *, beside: float = 0.0) -> Drawing:
     """Put panels, which stand one below the other, on one white sheet, with so many px left free beside them."""
     width = round(max(panel.outer[0] for panel in panels) + beside)
     height = round(sum(panel.outer[1] for panel in panels))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from contourslam.report.naming import COLOURS, label
 from contourslam.report.svg.axes import Axes
 from contourslam.report.svg.colours import GREY, INK, ORANGE, SKY
 from contourslam.report.svg.drawing import Drawing, drawing
+from contourslam.report.svg.legend import Header
 from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import summary, wheels
 from contourslam.report.sweep.values import Condition, Summary, Sweep
@@ -84,7 +84,7 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
     entries = [(label(name), own[name]) for name in means]
     if np.isfinite(odometry).any():
         entries.append(("raw odometry", ORANGE))
-    header, height = _header(title, entries)
+    header = Header(title, entries, _WIDTH)
     values = np.concatenate([*means.values(), *(bound.ravel() for bound in bounds.values()), odometry])
     axes = Axes(
         span,
@@ -94,7 +94,7 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
         labels=(_TITLES[found.axis], measure.heading),
         unit=measure.unit,
         logarithmic=measure.ratio,
-        offset=(0.0, height - 20.0),
+        offset=(0.0, header.outer[1]),
     )
     axes.line(x, odometry, ORANGE, 1.6, name="raw odometry")
     for k, (name, mean) in enumerate(means.items()):
@@ -104,11 +104,7 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
         axes.segments(np.stack([np.repeat(at[whole, None], 2, axis=1), bounds[name][whole]], axis=-1), own[name], 1.6)
         shown = np.isfinite(mean)
         axes.dots(np.stack([at[shown], mean[shown]], axis=-1), own[name], 5.5)
-    plain = drawing([axes])
-    taller = plain.height + round(height - 20.0)
-    size = f'height="{plain.height}" viewBox="0 0 {plain.width} {plain.height}"'
-    text = plain.text.replace(size, f'height="{taller}" viewBox="0 0 {plain.width} {taller}"', 1)
-    return Drawing(text.replace("</svg>\n", f"{header}</svg>\n"), plain.width, taller)
+    return drawing([header, axes])
 
 
 def _span(values: Floats, *, logarithmic: bool) -> tuple[float, float]:
@@ -116,22 +112,6 @@ def _span(values: Floats, *, logarithmic: bool) -> tuple[float, float]:
     if logarithmic:
         return 0.85 * float(known.min()), 1.2 * float(known.max())
     return 0.0, 1.1 * max(float(known.max()), 1e-6)
-
-
-def _header(title: str, entries: Sequence[tuple[str, str]]) -> tuple[str, float]:
-    """Title and names of the lines, in as many rows as they need, as SVG; and how high it is, px."""
-    parts = [f'<text x="62" y="18" font-weight="600">{escape(title)}</text>']
-    left, top = 62.0, 38.0
-    for name, colour in entries:
-        wide = 36.0 + 6.6 * len(name)
-        if left + wide > 62.0 + _WIDTH + 14.0:
-            left, top = 62.0, top + 18.0
-        parts.append(
-            f'<path d="M{left:.0f} {top - 4:.0f}h16" stroke="{colour}" stroke-width="4"/>'
-            f'<text x="{left + 21:.0f}" y="{top:.0f}">{escape(name)}</text>'
-        )
-        left += wide
-    return "\n".join(parts), top + 16.0
 
 
 def colours(detectors: Sequence[str]) -> dict[str, str]:
