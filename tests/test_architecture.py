@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import contourslam
@@ -65,9 +66,14 @@ MAY_USE_EXTRAS = (
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@cache
 def imported(path: Path) -> set[str]:
     """Names of the modules that a file imports; those under TYPE_CHECKING bind nothing."""
-    tree = ast.parse(path.read_text())
     nodes: list[ast.AST] = []
 
     def walk(node: ast.AST) -> None:
@@ -77,7 +83,7 @@ def imported(path: Path) -> set[str]:
             nodes.append(child)
             walk(child)
 
-    walk(tree)
+    walk(tree_of(path))
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     return names | {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
 
@@ -86,9 +92,10 @@ def room(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+@cache
 def called(path: Path) -> set[str]:
     """Names of the plain functions, and of the functions of plain modules, that a file calls."""
-    functions = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+    functions = [node.func for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call)]
     plain = {function.id for function in functions if isinstance(function, ast.Name)}
     dotted = {ast.unparse(function) for function in functions if isinstance(function, ast.Attribute)}
     return plain | dotted
@@ -119,7 +126,7 @@ def test_no_kernel_calls_the_linear_algebra_for_which_numba_needs_scipy() -> Non
     """Compiled where SciPy is, such a kernel is taken from the cache where it is not, and ends the whole process."""
     wrong = []
     for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.FunctionDef) and any(ast.unparse(d) == "kernel" for d in node.decorator_list):
                 names = [ast.unparse(n) for n in ast.walk(node) if isinstance(n, ast.Attribute)]
                 matrix = [n for n in ast.walk(node) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.MatMult)]
