@@ -100,7 +100,7 @@ def errors(shared: Shared, drives: Iterable[Drive]) -> dict[str, float]:
     by_name = {drive.name: drive for drive in drives}
     ends = np.cumsum([0, *shared.counts])
     names = [name for name, _ in shared.members]
-    poses = [frames for _, frames in shared.frames()]
+    poses = [frames for _, _, frames in shared.frames()]
     stamps = [shared.saved.keyframes.stamps[a:b] for a, b in pairwise(ends)]
     truth = [by_name[name].true(own) for name, own in zip(names, stamps, strict=True)]
     motion = fit(poses, truth)
@@ -111,7 +111,7 @@ def laid(shared: Shared) -> dict[str, Floats]:
     """Ways of the robots as seen from the first keyframe of one of them, whatever the frame of the map."""
     from contourslam.geometry.poses import between
 
-    frames = {name: poses for (name, _), poses in shared.frames()}
+    frames = {name: poses for (name, _), _, poses in shared.frames()}
     return {name: between(frames["one"][0], poses) for name, poses in frames.items()}
 
 
@@ -196,7 +196,7 @@ def test_unrelated_buildings_are_never_joined_and_each_robot_there_has_its_own_f
     for shared in server.common_maps():
         ((name, _),) = shared.members
         assert answers[name].members == (name,)
-        ((_, frames),) = shared.frames()
+        ((_, _, frames),) = shared.frames()
         np.testing.assert_allclose(frames[0], 0.0, atol=1e-6)
         assert np.linalg.eigvalsh(answers[name].covariance).min() > 0.0
 

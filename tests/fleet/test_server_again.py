@@ -57,7 +57,7 @@ def test_a_robot_that_goes_on_in_its_kept_map_shares_it_with_its_run_of_before(t
     assert shared.members == (("robot", 1), ("robot", 2))
     assert shared.counts == (old, len(slam.memory.keyframes) - old)  # nothing is there twice
     assert (server.joined(), server.search.looks) == ((), 0)  # and nothing was searched for
-    first, second = (poses for _, poses in shared.frames())
+    first, second = (poses for _, _, poses in shared.frames())
     np.testing.assert_array_equal(second[:old], first)
     slam.finish()
     assert slam.settled is not None

@@ -1,6 +1,6 @@
 """Common maps as messages: corners and walls, the robots' ways, and all of them for RViz."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped
@@ -18,14 +18,6 @@ Floats = NDArray[np.float64]
 # Of the robots in turn; all can be told apart by those who see red and green alike.
 COLOURS: tuple[Colour, ...] = (WALL, (0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.80, 0.47, 0.65), (0.34, 0.71, 0.91))
 NAMED = 0.35  # m, height of a robot's name
-
-
-def drives(shared: Shared) -> Iterator[tuple[str, int, Floats, Floats]]:
-    """Give each drive of a common map: robot, run, stamps (s) and poses of its keyframes, shapes (k,) and (k, 3)."""
-    keyframes = shared.saved.keyframes
-    if keyframes is not None:
-        for (robot, run), rows in zip(shared.members, shared.rows, strict=True):
-            yield robot, run, keyframes.stamps[rows], keyframes.poses[rows]
 
 
 def fleet_markers(
@@ -48,7 +40,7 @@ def fleet_markers(
         head, within = head_of(shared.number), f"map {shared.number}: "
         saved = shared.saved
         drawn += map_markers(head, saved.corners, saved.walls, sigmas, within).markers
-        for number, (robot, _, _, poses) in enumerate(drives(shared)):
+        for number, ((robot, _), _, poses) in enumerate(shared.frames()):
             colour = COLOURS[robots.index(robot) % len(COLOURS)]
             points = [Point(x=x, y=y, z=0.02) for x, y, _ in poses.tolist()]
             if len(points) > 1:

@@ -12,7 +12,7 @@ from visualization_msgs.msg import MarkerArray
 
 from contourslam.fleet.facts import Answer
 from contourslam.fleet.server import FleetServer
-from contourslam_ros.fleet_drawing import drives, fleet_markers, way_message
+from contourslam_ros.fleet_drawing import fleet_markers, way_message
 from contourslam_ros.fleet_settings import FleetConfig
 from contourslam_ros.fleet_topics import in_topic
 from contourslam_ros.map_sender import LATCHED
@@ -81,7 +81,7 @@ class FleetMaps:
                 gone = LandmarkMap(header=head)  # into another map
                 publisher.publish(gone if saved is None else landmark_message(head, saved.corners, saved.walls))
         for shared in maps:
-            for robot, run, stamps, poses in drives(shared):
+            for (robot, run), stamps, poses in shared.frames():
                 if newest.get(robot) == run and ways.get(robot) in wanted:
                     ways[robot].publish(way_message(self._head(shared.number), stamps, poses))
         if self._markers in wanted:

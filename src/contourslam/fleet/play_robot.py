@@ -110,7 +110,7 @@ class Played:
         """Give the times (s) of its scans that are in a common map, shape (n,), and the poses there, shape (n, 3)."""
         poses: list[Floats] = []
         times: list[float] = []
-        for source, frames in shared.frames():
+        for source, _, frames in shared.frames():
             told = [each for each in self.told if source == (self.name, each.run) and each.keyframe < len(frames)]
             if told:
                 keys = np.array([each.keyframe for each in told])

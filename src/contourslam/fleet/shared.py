@@ -37,11 +37,11 @@ class Shared:
     joined: tuple[Joined, ...]
     rows: tuple[Ints, ...]
 
-    def frames(self) -> Iterator[tuple[Source, Floats]]:
-        """Give the runs and the poses of their keyframes, each of shape (k, 3)."""
+    def frames(self) -> Iterator[tuple[Source, Floats, Floats]]:
+        """Give the runs, and the stamps (s) and poses of their keyframes, of shapes (k,) and (k, 3)."""
         if self.saved.keyframes is not None:
             for source, rows in zip(self.members, self.rows, strict=True):
-                yield source, self.saved.keyframes.poses[rows]
+                yield source, self.saved.keyframes.stamps[rows], self.saved.keyframes.poses[rows]
 
 
 def share(common: CommonMap, saved: SavedMap) -> Shared:
