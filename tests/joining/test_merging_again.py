@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contourslam.config import Config
-from contourslam.geometry.poses import between_one, compose, compose_one, interpolate
+from contourslam.geometry.poses import between, between_one, compose, compose_one, interpolate, inverse
 from contourslam.maps import Relations, SavedMap
 from contourslam.scan import LaserScan, Odometry, TruePose
 
@@ -18,7 +18,8 @@ pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 from contourslam.graph import GraphSlam, kept
 from contourslam.joining.again import Again, look_again
 from contourslam.joining.building import build, keyframes_of
-from contourslam.joining.merging import remember_all
+from contourslam.joining.joint import Evidence, Joint, Tie
+from contourslam.joining.merging import remember_all, solve_map
 from contourslam.simulation.long_drive import building_drive
 
 Floats = NDArray[np.float64]
@@ -102,3 +103,19 @@ def test_what_is_tied_already_is_not_looked_for() -> None:
 @pytest.mark.parametrize("building", [1])
 def test_a_building_that_only_lies_there_is_not_taken_for_this_one(building: int) -> None:
     assert found(mapped(building, 0.0, 0.3), compose(beside(), np.array([0.3, 0.2, 0.0])))[0] == []
+
+
+@pytest.mark.parametrize("off", [np.array([1.3, 0.0, 0.0]), np.array([0.0, -1.3, 0.0])], ids=["along", "across"])
+def test_a_map_that_hangs_on_one_loose_tie_is_put_right_as_far_as_that_leaves_it_open(off: Floats) -> None:
+    maps = mapped(0, 0.0, 0.52), mapped(0, 0.52, 1.0)
+    first, second = map(keyframes_of, maps)
+    last = len(first.stamps) - 1
+    true = true_at(np.concatenate([first.stamps, second.stamps]))
+    seen = compose_one(between_one(true[last], true[last + 1]), off)
+    loose = Tie(last, 0, seen, np.diag([0.6**2, 0.6**2, 0.02**2]))
+    frame = compose_one(compose_one(first.poses[last], seen), inverse(second.poses[0]))
+    joint = Joint(frame, (loose,), Evidence(5, 5, 30.0, 0.0, 9.0, 0.1), "search")
+    built = build(maps, np.array([np.zeros(3), frame]), {(0, 1): joint}).saved
+    poses = keyframes_of(solve_map(built, CONFIG)).poses
+    error = between(compose(poses[0], between(true[0], true)), poses)[last + 1 :, :2]
+    assert np.median(np.hypot(*error.T)) < 0.1

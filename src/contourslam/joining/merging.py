@@ -115,16 +115,17 @@ def solve_map(built: SavedMap, config: Config) -> SavedMap:
         The same keyframes, sightings and stretches; corners and walls anew, those that several maps had being one.
     """
     memory = remember_all(built, config)
-    for _ in range(LOOKS):
-        saved = _refined(memory, built.about)
+    for rounds in (0, *[ROUNDS] * LOOKS):
+        # Before any keyframe is tied anew: where a map is bent it would be tied as bent, and then nobody would look.
+        saved = _refined(memory, built.about, rounds)
         relations = saved.relations
         memory = remember_all(saved, config)
         found = [] if relations is None else look_again(memory, keyframes_of(saved), relations)
-        if not found:
+        if rounds and not found:
             return saved
         for again in found:
             _tie(memory, again)
-    return _refined(memory, built.about)
+    return _refined(memory, built.about, ROUNDS)
 
 
 def _tie(memory: Memory, again: Again) -> None:
@@ -133,8 +134,8 @@ def _tie(memory: Memory, again: Again) -> None:
     memory.graph.relate(anchor, again.keyframe, again.pose, information, ROBUST_TIES, tie=True)
 
 
-def _refined(memory: Memory, about: Mapping[str, str]) -> SavedMap:
-    settled = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings, ROUNDS)
+def _refined(memory: Memory, about: Mapping[str, str], rounds: int) -> SavedMap:
+    settled = refine(memory.graph, memory.keyframes, memory.places, memory.landmarks.sightings, rounds)
     return keep(memory, settled, about)
 
 
