@@ -3,15 +3,16 @@ from pathlib import Path
 
 import pytest
 
-from contourslam.cli import main
+from contourslam.cli import main, warm_up
 from contourslam.live import rehearsal
 
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One stage in place of all; tests/live/test_rehearsal.py has all of them."""
+    """One stage in place of all; tests/live/test_rehearsal.py and tests/fleet/test_rehearsal.py have all of them."""
     whole = rehearsal.stages
     monkeypatch.setattr(rehearsal, "stages", lambda folder: [whole(folder)[-1]])
+    monkeypatch.setattr(warm_up, "_fleet", list)
 
 
 @pytest.mark.usefixtures("short")
@@ -34,6 +35,13 @@ def test_a_machine_without_gtsam_is_warmed_up_for_the_filter_alone(
 ) -> None:
     with_graph = [name for name, _ in rehearsal.stages(tmp_path)]
     monkeypatch.setattr(rehearsal, "find_spec", lambda name: None)
+    monkeypatch.setattr(warm_up, "find_spec", lambda name: None)
     without = [name for name, _ in rehearsal.stages(tmp_path)]
     assert without == [name for name in with_graph if "graph" not in name]
     assert "localising" in without
+    assert warm_up._fleet() == []
+
+
+def test_a_fleet_is_warmed_up_where_there_is_the_graph() -> None:
+    pytest.importorskip("gtsam", reason="needs the extra 'graph'")
+    assert [name for name, _ in warm_up._fleet()] == ["a fleet's robots and server"]

@@ -1,13 +1,18 @@
 """``contourslam warm-up``: everything compiled before the robot drives."""
 
-import sys
 import tempfile
 from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contourslam.cli.console import note, print_json
 from contourslam.cli.options import Flag, Json
 from contourslam.errors import ContourslamError
+
+if TYPE_CHECKING:
+    from contourslam.live.rehearsal import Stage
 
 
 class _ColdError(ContourslamError):
@@ -18,10 +23,10 @@ class _ColdError(ContourslamError):
 class WarmUp:
     """Compile everything that runs on a robot, so that its first scan is not late by a minute.
 
-    A drive made up for it goes through mapping, localisation and the detectors; what is compiled on the way is cached
-    for later processes of the same user, beside the package or in NUMBA_CACHE_DIR. Repeat it after an update of
-    contourslam, Numba or Python. It takes a minute or two on a laptop, about five times that on a Raspberry Pi, and
-    up to 700 MB of memory, which no later start needs.
+    A drive made up for it goes through mapping, localisation and the detectors, and a fleet is told of it; what is
+    compiled on the way is cached for later processes of the same user, beside the package or in NUMBA_CACHE_DIR. Repeat
+    it after an update of contourslam, Numba or Python. It takes a minute or two on a laptop, about five times that on a
+    Raspberry Pi, and up to 700 MB of memory, which no later start needs.
 
     Example: contourslam warm-up
     """
@@ -51,7 +56,7 @@ class WarmUp:
 
         start = perf_counter()
         with tempfile.TemporaryDirectory() as folder, watch_compilation(begun), bar:
-            for name, run in [*stages(Path(folder)), ("occupancy grid", _draw_grid)]:
+            for name, run in [*stages(Path(folder)), *_fleet(), ("occupancy grid", _draw_grid)]:
                 bar.set_description_str(name)
                 run()
         seconds, place = perf_counter() - start, cache_folder()
@@ -61,9 +66,19 @@ class WarmUp:
             print(f"compiled {len(compiled)} kernels in {seconds:.0f} s; they are kept in {place}")
         else:
             print(f"all is warm: nothing was left to compile ({seconds:.1f} s); kept in {place}")
-        if not self.check and "gtsam" not in sys.modules:
+        if not self.check and find_spec("gtsam") is None:
             note("the graph back end was left out: GTSAM is not installed")
         return 0
+
+
+def _fleet() -> "list[Stage]":
+    """What a fleet's robots and server run; nothing without the graph, which they map with."""
+    if find_spec("gtsam") is None:
+        return []
+    from contourslam.cli.run import DEFAULTS
+    from contourslam.fleet.rehearsal import rehearse
+
+    return [("a fleet's robots and server", partial(rehearse, DEFAULTS))]
 
 
 def _draw_grid() -> None:

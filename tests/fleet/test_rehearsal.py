@@ -1,0 +1,18 @@
+"""After the rehearsal neither a robot that tells a fleet of its drive nor the server waits for the compiler."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("gtsam", reason="needs the extra 'graph'")
+pytest.importorskip("shapely", reason="needs the extra 'simulation'")
+
+
+def test_after_the_rehearsal_a_fleet_compiles_nothing() -> None:
+    program = Path(__file__).with_name("rehearsed.py")
+    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert json.loads(done.stdout) == []
