@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from contourslam.evaluation.errors import pose_errors, rmse
+from contourslam.evaluation.errors import fit, pose_errors, rmse
 from contourslam.geometry.poses import compose
 
 
@@ -41,3 +41,12 @@ def test_without_any_truth_the_rmse_is_unknown():
 def test_trajectories_of_different_length_are_refused():
     with pytest.raises(ValueError, match=r"\(4, 3\).*\(5, 3\)"):
         pose_errors(np.zeros((4, 3)), np.zeros((5, 3)))
+
+
+def test_the_rigid_motion_that_fits_best_is_found():
+    rng = np.random.default_rng(0)
+    points, motion = rng.normal(size=(50, 2)), np.array([3.0, -2.0, 2.5])
+    moved = compose(motion, np.column_stack([points, np.zeros(50)]))
+    np.testing.assert_allclose(fit(points, moved[:, :2]), motion, atol=1e-9)
+    np.testing.assert_allclose(fit(points[:1], moved[:1, :2])[:2], moved[0, :2] - points[0])
+    assert np.isnan(fit(points[:0], points[:0])).all()

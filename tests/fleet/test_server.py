@@ -10,7 +10,8 @@ import pytest
 
 from contourslam.cli.run import DEFAULTS
 from contourslam.contour.contours import Floats
-from contourslam.evaluation.fleet import fit, rmse
+from contourslam.evaluation.errors import fit
+from contourslam.evaluation.fleet import rmse
 from contourslam.fleet.facts import Answer
 from contourslam.fleet.inbox import Inbox
 from contourslam.fleet.reporter import Reporter
@@ -103,7 +104,7 @@ def errors(shared: Shared, drives: Iterable[Drive]) -> dict[str, float]:
     poses = [frames for _, _, frames in shared.frames()]
     stamps = [shared.saved.keyframes.stamps[a:b] for a, b in pairwise(ends)]
     truth = [by_name[name].true(own) for name, own in zip(names, stamps, strict=True)]
-    motion = fit(poses, truth)
+    motion = fit(*(np.concatenate(ways)[:, :2] for ways in (poses, truth)))
     return {name: rmse(p, q, motion) for name, p, q in zip(names, poses, truth, strict=True)}
 
 

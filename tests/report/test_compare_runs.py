@@ -34,7 +34,7 @@ from contourslam.report.page.runs.differs import other_options
 from contourslam.report.page.runs.values import RunsReport, differing
 from contourslam.report.relation_table import RELATIONS, read_relation_table, write_relation_table
 from contourslam.report.result_folder import write_result_folder
-from contourslam.report.runs_groups import Errors, fit, grouped
+from contourslam.report.runs_groups import Errors, grouped
 from contourslam.report.runs_page import write_runs_report
 from contourslam.report.runs_reading import distinct_names, read_runs
 
@@ -128,14 +128,6 @@ def test_simulated_drives_of_other_seeds_are_other_recordings(tmp_path, make_run
     assert [group.recording for group in grouped(read_runs(folders))] == ["hall.bag", "hall.bag (2)"]
 
 
-def test_the_rigid_motion_that_fits_best_is_found() -> None:
-    rng = np.random.default_rng(0)
-    points, motion = rng.normal(size=(50, 2)), np.array([3.0, -2.0, 2.5])
-    moved = compose(motion, np.column_stack([points, np.zeros(50)]))
-    np.testing.assert_allclose(fit(points, moved[:, :2]), motion, atol=1e-9)
-    np.testing.assert_allclose(fit(points[:1], moved[:1, :2])[:2], moved[0, :2] - points[0])
-
-
 def test_the_errors_of_relations_come_back_from_their_table(tmp_path, make_graph_run) -> None:
     found = judged(make_graph_run())
     write_relation_table(tmp_path / RELATIONS, found)
@@ -222,6 +214,7 @@ def test_a_setting_over_two_recordings_has_mean_and_spread(report) -> None:
     assert spread == pytest.approx(np.std(both, ddof=1), abs=1e-4)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_recording_that_was_mapped_more_often_counts_no_more(folders, tmp_path, make_run) -> None:
     again = written(tmp_path / "again", noisier(make_run(), 2.0), truth=False)
     runs = read_runs([folders[0], again, folders[3]])
@@ -252,6 +245,7 @@ def test_the_numbers_hold_all_that_the_page_shows(report) -> None:
     assert metrics["runs"]["c"]["complete"] is False
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_earlier_comparisons_figures_do_not_stay(report, folders, tmp_path) -> None:
     own = ("figures/robot.pdf", "figures/maps_of_mine.svg", "tables/results.csv", "tables/settings.txt")
     for name in ("figures/maps_9.pdf", "tables/measures_9.tex", *own):
@@ -271,6 +265,7 @@ def test_all_that_a_comparison_writes_is_known_as_its_own(report, folders, tmp_p
             assert sorted(known.own_files(part)) == sorted((folder / part).iterdir()) != []
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("truth", [True, False])
 def test_the_opening_words_quote_what_the_page_tables(tmp_path, make_run, truth) -> None:
     runs = [
@@ -285,6 +280,7 @@ def test_the_opening_words_quote_what_the_page_tables(tmp_path, make_run, truth)
     assert pair.split(",")[0].lower() in [one["measure"] for one in pairs]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_too_few_pairs_are_said_to_be(tmp_path, make_run) -> None:
     run = make_run(scans=24)
     runs = [written(tmp_path / name, noisier(run, by), truth=False) for name, by in (("a", 1.0), ("b", 5.0))]

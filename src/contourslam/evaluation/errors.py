@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.geometry.angles import wrap
-from contourslam.geometry.poses import between, compose
+from contourslam.geometry.poses import between, compose, transform
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +73,27 @@ def align_first(poses: Floats, truth: Floats) -> Floats:
         return poses
     first = int(np.argmax(known))
     return compose(truth[first], between(poses[first], poses))
+
+
+def fit(points: Floats, onto: Floats) -> Floats:
+    """Find the rigid motion, without scale, that lays points onto others with the least sum of squares (Umeyama 1991).
+
+    Parameters
+    ----------
+    points, onto : ndarray, shape (n, 2)
+        m.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Pose of the points' frame in that of the others: m, m, rad; NaN where there are none.
+    """
+    if not len(points):
+        return np.full(3, np.nan)
+    middle, target = points.mean(axis=0), onto.mean(axis=0)
+    a, b = points - middle, onto - target
+    turn = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
+    return np.array([*(target - transform(np.array([0.0, 0.0, turn]), middle[None])[0]), turn])
 
 
 def pose_errors(poses: Floats, truth: Floats, *, aligned: bool = False) -> Floats:

@@ -1,38 +1,15 @@
-"""A fleet judged: one rigid motion lays the common map on the world, for all robots together; and who met when."""
+"""A fleet judged: how far its robots are off in a frame that they share, and who met when."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from contourslam.contour.contours import Floats
-from contourslam.geometry.poses import compose, transform
+from contourslam.geometry.poses import compose
 
 ROOM = 6.0  # m across: two robots were in the same room where their ways pass through the same circle of this size
 WAY = 8.0  # m of either's way, within reach of the other's, from which on they have seen the same room
 STEP = 0.2  # m of way between the points at which that is looked at
-
-
-def fit(poses: Sequence[Floats], truth: Sequence[Floats]) -> Floats:
-    """Find the rigid motion that lays the positions of all robots best on the true ones, by Kabsch (1976).
-
-    Parameters
-    ----------
-    poses, truth : sequence of ndarray, shape (n, 3)
-        Of each robot, row by row at the same times: m, m, rad.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Frame of the poses in the world: m, m, rad; NaN where there is nothing to fit.
-    """
-    here, there = np.concatenate(poses)[:, :2], np.concatenate(truth)[:, :2]
-    if not len(here):
-        return np.full(3, np.nan)
-    a, b = here - here.mean(axis=0), there - there.mean(axis=0)
-    turn = math.atan2(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()), float((a * b).sum()))
-    middle = transform(np.array([0.0, 0.0, turn]), here.mean(axis=0)[None])[0]
-    return np.array([*(there.mean(axis=0) - middle), turn])
 
 
 def rmse(poses: Floats, truth: Floats, motion: Floats) -> float:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from contourslam.contour.contours import Floats
-from contourslam.evaluation.errors import align_first
-from contourslam.evaluation.fleet import fit, met, rmse
+from contourslam.evaluation.errors import align_first, fit
+from contourslam.evaluation.fleet import met, rmse
 from contourslam.fleet.common import Joined
 from contourslam.fleet.play import Fleet
 from contourslam.fleet.play_robot import Played
@@ -89,7 +89,8 @@ def _add_errors(robots: dict[str, dict[str, Any]], members: list[Played], shared
     if not known:
         return
     truth = {robot.name: robot.true(known[robot.name][0]) for robot in members if robot.name in known}
-    motion = fit([poses for _, poses in known.values()], list(truth.values()))
+    every = np.concatenate([poses for _, poses in known.values()]), np.concatenate(list(truth.values()))
+    motion = fit(*(poses[:, :2] for poses in every))  # one for all robots of the map
     for robot in members:
         if robot.name not in known:
             continue

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contourslam.evaluation.bootstrap import PairedDifference, paired_difference
+from contourslam.evaluation.errors import fit
 from contourslam.geometry.angles import wrap
 from contourslam.geometry.poses import between, compose
 from contourslam.report.runs_reading import JudgedRun
@@ -214,26 +215,6 @@ def _group(runs: list[JudgedRun], recording: str) -> Group:
             _, ours, theirs = _common(first.result, run.result)
             motions.append(fit(run.result.poses[theirs, :2], first.result.poses[ours, :2]))
     return Group(recording, tuple(runs), tuple(motions))
-
-
-def fit(points: Floats, onto: Floats) -> Floats:
-    """Rigid motion, without scale, that lays points onto others with the least sum of squares (Umeyama 1991).
-
-    Parameters
-    ----------
-    points, onto : ndarray, shape (n, 2)
-        m; n is 1 or more.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Pose of the points' frame in that of the others: m, m, rad.
-    """
-    middle, target = points.mean(axis=0), onto.mean(axis=0)
-    a, b = points - middle, onto - target
-    turn = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
-    cos, sin = np.cos(turn), np.sin(turn)
-    return np.array([*(target - np.array([[cos, -sin], [sin, cos]]) @ middle), turn])
 
 
 def _pairs(one: JudgedRun, other: JudgedRun) -> list[Pair]:
