@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ import pytest
 from observer import Observer
 from player import Plan
 
-from contourslam.live.rehearsal import stages
 from contourslam.scan import LaserScan, Odometry
 from contourslam.simulation.simulate import SimulatedRun
 
@@ -73,8 +72,16 @@ class Processes:
             words += ["-p", f"{name.replace('__', '.')}:={str(value).lower() if isinstance(value, bool) else value}"]
         return self._run(words, log)
 
+    def drive(self, observers: Iterable[Observer], *plans: dict[str, Any]) -> None:
+        """Play as each plan says, all at once, when the nodes know who listens to them; until all have driven."""
+        begun = self._folder / f"begun_{len(self._running)}"
+        players = [self.play(begun=str(begun), **plan) for plan in plans]
+        assert all(observer.knows_its_node() for observer in observers)
+        begun.touch()
+        assert [player.wait(200.0) for player in players] == [0] * len(players)
+
     def play(self, **choices: Any) -> "subprocess.Popen[str]":
-        """Play the recording as a :class:`Plan` says."""
+        """Play the recording as a :class:`Plan` says, as soon as a node listens."""
         robot = choices.get("namespace", "")
         path = self._folder / f"robot_{robot}.plan"
         self._plans[robot] = Plan(recording=str(self._recording), report=str(path.with_suffix(".report")), **choices)
@@ -104,12 +111,30 @@ class Processes:
         self._running.clear()
 
 
+def needs_kernels(item: pytest.Item) -> bool:
+    return "compiled" in getattr(item, "fixturenames", ())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those that need what is compiled come last, when it is."""
+    items.sort(key=needs_kernels)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiling(request: pytest.FixtureRequest) -> Iterator["subprocess.Popen[bytes] | None"]:
+    """Compile beside the tests that need no kernel."""
+    if not any(map(needs_kernels, request.session.items)):
+        yield None
+        return
+    with subprocess.Popen([sys.executable, str(HERE / "compiling.py")]) as process:
+        yield process
+        process.kill()
+
+
 @pytest.fixture(scope="session")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+def compiled(compiling: "subprocess.Popen[bytes]") -> None:
     """All kernels are in Numba's cache: else the nodes that start together would each compile them, for minutes."""
-    work = dict(stages(tmp_path_factory.mktemp("compiled")))
-    for name in ("mapping, graph", "continuing a map, graph", "localising"):
-        work[name]()
+    assert compiling.wait() == 0
 
 
 @pytest.fixture(scope="module")

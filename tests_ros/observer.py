@@ -38,9 +38,9 @@ class Observer:
     def __init__(self, namespace: str, name: str, common: "Observer | None" = None) -> None:
         self.node = rclpy.create_node(name, namespace=namespace)
         self.poses: list[tuple[float, float, np.ndarray, np.ndarray]] = []
-        # Of all robots, so that one node is enough to listen to them.
+        # Of all robots, and many: one node is enough to listen to them.
         self.transforms: list[TransformStamped] = [] if common is None else common.transforms
-        self.told: list[tuple[float, DiagnosticStatus]] = [] if common is None else common.told
+        self.told: list[tuple[float, DiagnosticStatus]] = []
         self.landmarks: LandmarkMap | None = None
         self.markers: MarkerArray | None = None
         self.grid: OccupancyGrid | None = None
@@ -52,7 +52,7 @@ class Observer:
         listen(OccupancyGrid, "map", lambda message: setattr(self, "grid", message), LATCHED)
         if common is None:
             listen(TFMessage, "/tf", lambda message: self.transforms.extend(message.transforms), 1000)
-            listen(DiagnosticArray, "/diagnostics", self._on_told, 100)
+        listen(DiagnosticArray, "/diagnostics", self._on_told, 100)  # last: see knows_its_node
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._ended = False
@@ -90,6 +90,22 @@ class Observer:
         within = self.node.get_namespace().rstrip("/") + "/"
         return [(when, status) for when, status in list(self.told) if status.name.startswith(within)]
 
+    def knows_its_node(self, seconds: float = 300.0) -> bool:
+        """Wait until all that the node publishes will be heard.
+
+        A node sends only to those whom it has found. What was made last is found last, on both sides, and a node makes
+        its diagnostics after its poses: where those are heard, so are these.
+        """
+        return wait_for(lambda: bool(self._mine()), seconds)
+
+    def took_in(self, scans: float, unplaced: int = 0) -> int:
+        """Wait for so many scans, and a pose of each but a few; give how many the node says that it took in."""
+        wait_for(lambda: self._received() >= scans and len(self.poses) >= scans - unplaced, 10.0)
+        return self._received()
+
+    def _received(self) -> int:
+        return int(figures(self.latest("scans")).get("received", 0))
+
     def said(self, *words: str, since: float = 0.0) -> bool:
         """Whether a diagnostic that is no OK holds all words."""
         texts = [s.message for when, s in self._mine() if when >= since and s.level != DiagnosticStatus.OK]
@@ -116,6 +132,11 @@ def wait_for(condition: Callable[[], bool], seconds: float) -> bool:
             return False
         time.sleep(0.02)
     return True
+
+
+def figures(status: DiagnosticStatus | None) -> dict[str, str]:
+    """What a diagnostic says besides its message."""
+    return {} if status is None else {value.key: value.value for value in status.values}
 
 
 def error_of(drive: SimulatedRun, stamps: np.ndarray, poses: np.ndarray) -> np.ndarray:

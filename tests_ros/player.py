@@ -1,13 +1,16 @@
 """Plays a recording into ROS as a robot would: python player.py PLAN.json, in a process of its own.
 
+It begins when a node listens that has found all that is played.
 Stamps are those of the wall clock at which a message belongs, or with `clock` those of the recording, with /clock.
 """
 
 import faulthandler
 import json
+import math
 import sys
 import time
 from array import array
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +19,11 @@ import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.msg import Odometry as OdometryMessage
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.task import Future
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan as ScanMessage
 from tf2_msgs.msg import TFMessage
@@ -45,6 +52,8 @@ class Plan:
         A transform says where the lidar is.
     standing : bool
         Odometry comes before anybody listens, of a robot that stands.
+    begun : str
+        File that is waited for as well, for several to begin at once.
     """
 
     recording: str
@@ -58,6 +67,7 @@ class Plan:
     upside_down: bool = False
     mounted: bool = True
     standing: bool = False
+    begun: str = ""
     clock: bool = False
     rate: float = 1.0
 
@@ -113,6 +123,28 @@ def odometry_message(reading: Odometry, at: float, prefix: str) -> OdometryMessa
     return message
 
 
+def answered(node: Node, topic: str) -> Iterator[None]:
+    """Ask a node that listens to a topic; ends when it answers.
+
+    What is made last is found last, and what is sent last comes last: who answers has found all that this node made
+    before it asked, without which it would hear nothing of it, and all that was sent before has come.
+    """
+    listeners: list[TopicEndpointInfo] = []
+    while not listeners:
+        listeners = [i for i in node.get_subscriptions_info_by_topic(topic) if "UNKNOWN" not in i.node_name]
+        yield
+    name = f"{listeners[0].node_namespace.rstrip('/')}/{listeners[0].node_name}"
+    client = node.create_client(GetParameters, f"{name}/get_parameters")
+    answers: list[Future] = []
+    asked = -math.inf
+    while not any(answer.done() for answer in answers):
+        if time.monotonic() > asked + 0.2:  # what was asked before the two had found each other came to nobody
+            answers.append(client.call_async(GetParameters.Request()))
+            asked = time.monotonic()
+        rclpy.spin_once(node, timeout_sec=0.0)
+        yield
+
+
 def play(plan: Plan) -> None:
     messages = [m for m in open_recording(Path(plan.recording)).messages() if isinstance(m, LaserScan | Odometry)]
     # A scan is sent when it is complete, in the order of the recording: when its last beam's odometry is.
@@ -133,12 +165,21 @@ def play(plan: Plan) -> None:
     )
     if plan.mounted:
         still.publish(transform(0.0, plan.prefix + "base_link", plan.prefix + "laser", 0.1, 0.0, plan.turn, 0.2))
-    first = next(message for message in messages if isinstance(message, Odometry))
-    while not (scans.get_subscription_count() and (wheels.get_subscription_count() or plan.odometry != "topic")):
+    at_rest = next(message for message in messages if isinstance(message, Odometry))
+
+    def stand() -> None:
         if plan.standing:
-            wheels.publish(odometry_message(first, time.time(), plan.prefix))
+            wheels.publish(odometry_message(at_rest, time.time(), plan.prefix))
         time.sleep(0.02)
-    time.sleep(0.5)
+
+    for _ in answered(node, scans.topic_name):
+        stand()
+    while not (
+        scans.get_subscription_count()
+        and (wheels.get_subscription_count() or plan.odometry != "topic")
+        and (not plan.begun or Path(plan.begun).exists())
+    ):
+        stand()
 
     began, passed = time.monotonic(), 0.0
     wall = time.time()
@@ -167,7 +208,8 @@ def play(plan: Plan) -> None:
                     transform(at, plan.prefix + "odom", plan.prefix + "base_link", px, py, quaternion(heading))
                 )
         passed += min(last, times[-1] - zero) - first
-    time.sleep(1.0)
+    for _ in answered(node, scans.topic_name):
+        time.sleep(0.02)
     Path(plan.report).write_text(
         json.dumps({"shift": 0.0 if plan.clock else wall - zero - plan.pieces[0][0], "scans": sent})
     )

@@ -16,7 +16,7 @@ from contourslam_msgs.srv import SaveMap
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Path as Way
-from observer import LATCHED, Observer, wait_for
+from observer import LATCHED, Observer, figures, wait_for
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -109,10 +109,6 @@ class Robot:
     def all_is_acknowledged(self) -> bool:
         """Whether it says that the server has all it told."""
         return self.told().get("waiting") == "0"
-
-
-def figures(status: DiagnosticStatus | None) -> dict[str, str]:
-    return {} if status is None else {value.key: value.value for value in status.values}
 
 
 @dataclass

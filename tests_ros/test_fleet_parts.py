@@ -129,7 +129,7 @@ def test_sites_are_read_and_what_names_none_is_refused() -> None:
             FleetConfig(sites=wrong)
 
 
-def test_what_tells_a_fleet_is_compiled_before_the_robot_maps() -> None:
+def test_what_tells_a_fleet_is_compiled_before_the_robot_maps(compiled: None) -> None:
     program = Path(__file__).with_name("fleet_rehearsed.py")
     done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) == []

@@ -15,7 +15,7 @@ from contourslam.simulation.simulate import SimulatedRun
 from contourslam_ros.messages import header, pose_message
 
 CLOSE = 0.1  # m
-PIECE = [14.0, 28.0]  # begins far from where the map does
+PIECE = [14.0, 22.0]  # begins far from where the map does
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +35,8 @@ def found(
     observers = {node: observe(node) for node in files}
     for node, file in files.items():
         processes.start(node, namespace=node, frame_prefix=f"{node}/", map_file=file)
-    players = [processes.play(namespace=node, prefix=f"{node}/", pieces=[PIECE]) for node in files]
-    assert [player.wait(240.0) for player in players] == [0, 0]
+    plans = [{"namespace": node, "prefix": f"{node}/", "pieces": [PIECE]} for node in files]
+    processes.drive(observers.values(), *plans)
     return observers
 
 

@@ -5,11 +5,14 @@ import json
 import re
 import signal
 import socket
+import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
 from observer import wait_for
 from websockets.sync.client import ClientConnection, connect
 
@@ -37,9 +40,35 @@ def read_until(page: ClientConnection, kind: str, fits: Callable[[Any], object])
     raise AssertionError(f"no such {kind} came")
 
 
-def test_the_node_serves_its_page_to_those_who_have_the_link_that_it_logs(processes: Processes, tmp_path: Path) -> None:
-    port, log = free_port(), tmp_path / "log"
-    node = processes.start("slam", namespace="watched", log=log, view_port=port, view_host="0.0.0.0")
+@dataclass
+class Started:
+    """A node with a page."""
+
+    port: int
+    node: "subprocess.Popen[str]"
+    log: Path
+
+
+@pytest.fixture(scope="module")
+def started(processes: Processes, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Started]]:
+    """One that serves its page, and one whose port is taken; at the same time, for a node takes seconds to start."""
+    found = {}
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        for name, port in {"watched": free_port(), "second": taken.getsockname()[1]}.items():
+            log = tmp_path_factory.mktemp(name) / "log"
+            host = "0.0.0.0" if name == "watched" else "127.0.0.1"
+            node = processes.start("slam", namespace=name, log=log, view_port=port, view_host=host)
+            found[name] = Started(port, node, log)
+        yield found
+
+
+def test_the_node_serves_its_page_to_those_who_have_the_link_that_it_logs(
+    started: dict[str, Started], processes: Processes
+) -> None:
+    watched = started["watched"]
+    port, node, log = watched.port, watched.node, watched.log
     wait_for(lambda: "the live page is at" in log.read_text() or node.poll() is not None, 200.0)
     link = re.search(rf"the live page is at http://[^/]+:{port}/([\w-]{{20,}})/", log.read_text())
     assert link is not None
@@ -66,12 +95,7 @@ def test_the_node_serves_its_page_to_those_who_have_the_link_that_it_logs(proces
         assert node.wait(30.0) == 0
 
 
-def test_a_port_that_is_taken_ends_the_node_with_a_line(processes: Processes, tmp_path: Path) -> None:
-    log = tmp_path / "log"
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        node = processes.start("slam", namespace="second", log=log, view_port=taken.getsockname()[1])
-        assert node.wait(200.0) == 1
-    said = [line for line in log.read_text().splitlines() if "FATAL" in line]
+def test_a_port_that_is_taken_ends_the_node_with_a_line(started: dict[str, Started]) -> None:
+    assert started["second"].node.wait(200.0) == 1
+    said = [line for line in started["second"].log.read_text().splitlines() if "FATAL" in line]
     assert len(said) == 1 and "cannot be served" in said[0] and "another view_port" in said[0]

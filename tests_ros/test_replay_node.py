@@ -18,7 +18,7 @@ def replay(*parameters: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
-def test_it_writes_what_the_command_writes(recording: Path, tmp_path: Path) -> None:
+def test_it_writes_what_the_command_writes(compiled: None, recording: Path, tmp_path: Path) -> None:
     done = replay(f"bag:={recording}", f"output:={tmp_path / 'node'}", "contour.spacing:=0.06", "grid:=true")
     assert done.returncode == 0, done.stderr
     words = [

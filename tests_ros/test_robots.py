@@ -30,11 +30,8 @@ def robots(processes: Processes, observe: Callable[[str], Observer]) -> dict[str
     observers = {name: observe(name) for name in PLANS}
     for name in PLANS:
         processes.start("slam", namespace=name, frame_prefix=f"{name}/", **PARAMETERS.get(name, {}))
-    players = [
-        processes.play(**{"namespace": name, "prefix": f"{name}/", "pieces": PIECES, **plan})
-        for name, plan in PLANS.items()
-    ]
-    assert [player.wait(240.0) for player in players] == [0] * len(players)
+    plans = [{"namespace": name, "prefix": f"{name}/", "pieces": PIECES, **plan} for name, plan in PLANS.items()]
+    processes.drive(observers.values(), *plans)
     return observers
 
 
@@ -42,8 +39,10 @@ def robots(processes: Processes, observe: Callable[[str], Observer]) -> dict[str
 def test_each_robot_has_a_map_of_its_own_and_is_right_in_it(
     drive: SimulatedRun, processes: Processes, robots: dict[str, Observer], name: str
 ) -> None:
+    sent = processes.played(name)["scans"]
+    assert robots[name].took_in(sent) == sent
     stamps, poses = robots[name].trajectory()
-    assert len(stamps) == processes.played(name)["scans"]
+    assert len(stamps) == sent
     assert error_of(drive, stamps - processes.played(name)["shift"], poses).max() < CLOSE
     assert robots[name].frames == {f"{name}/map"}
     assert wait_for(lambda: robots[name].landmarks is not None, 5.0)
@@ -92,7 +91,8 @@ def test_a_robot_can_be_paused_resumed_and_begun_anew(
     assert robot.call(Trigger, "slam/reset").success
     assert robot.call(Trigger, "slam/resume").success
     assert processes.play(namespace="two", prefix="two/", pieces=[[0.0, 3.0]], **PLANS["two"]).wait(60.0) == 0
-    stamps, poses = robot.trajectory()
     played = processes.played("two")
+    assert wait_for(lambda: len(robot.poses) - before >= played["scans"], 5.0), len(robot.poses) - before
+    stamps, poses = robot.trajectory()
     assert len(stamps) - before == played["scans"]
     assert error_of(drive, stamps[before:] - played["shift"], poses[before:]).max() < CLOSE
