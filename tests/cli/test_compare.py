@@ -12,9 +12,10 @@ from contourslam.cli import main
 Failure = Callable[..., str]
 SMALL = ["--duration", "5", "--jobs", "1", "--no-noise-sweep", "--no-details"]
 
-# Presses Ctrl-C once the first replay of the comparison is done.
+# Presses Ctrl-C once the first replay of the comparison is done; its figures are made and not drawn.
 INTERRUPTED = """
 import os, signal, sys
+from matplotlib.figure import Figure
 from contourslam.cli import main
 from contourslam.experiments import parallel
 class Observer(parallel.Observer):
@@ -25,10 +26,12 @@ class Observer(parallel.Observer):
                 os.kill(os.getpid(), signal.SIGINT)
         super().__init__(told, stopped)
 parallel.Observer = Observer
+Figure.savefig = lambda figure, path, **more: path.write_text("")
 sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_compare_writes_the_promised_figures_and_prints_table_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -31,7 +31,6 @@ PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
     "0000000a49444154789c6368000000820081777f1a210000000049454e44ae426082"
 )  # one grey pixel
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="8" height="8"/>'
 SCENE = '{"seen": {"wall": 0.9, "floor": null}, "bytes": 1000, "pictures": {"used": 7}}'
 
 
@@ -72,17 +71,17 @@ def test_the_page_of_a_run_and_its_scene(make_graph_run: Callable[..., RunResult
     assert faults(tmp_path / "index.html") == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_page_of_the_detectors(
     make_study: Callable[..., Any], tmp_path: Path, faults: Faults, monkeypatch: pytest.MonkeyPatch
 ):
     renderer = "contourslam.report.page.room.render_room"
     monkeypatch.setattr(renderer, lambda room, path, **size: path.write_bytes(PNG))
-    # Nobody looks at the figures here, and to draw them takes ten times as long as all the rest.
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, path, **more: path.write_text(SVG))
     write_report(tmp_path, make_study(), command="contourslam compare --seeds 3")
     assert faults(tmp_path / "index.html") == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_page_of_several_runs(make_run: Callable[..., RunResult], tmp_path: Path, faults: Faults):
     run = make_run()
     assert run.truth is not None

@@ -101,6 +101,7 @@ def test_metrics_hold_what_the_issue_asks_for(report, make_study):
     assert metrics["config"]["lidar"]["sigma_range"] == 0.01
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_interrupted_study_is_marked_on_the_page_and_in_the_numbers(tmp_path, make_study, monkeypatch):
     no_renderer(monkeypatch)
     study = make_study(detectors=("wu",), seeds=1, complete=False)
@@ -111,6 +112,7 @@ def test_an_interrupted_study_is_marked_on_the_page_and_in_the_numbers(tmp_path,
     assert metrics["detectors"]["wu"]["rmse"]["x"]["sd"] is None
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_study_in_which_nothing_was_finished_still_gives_a_page(tmp_path, make_study, parsed):
     study = make_study(seeds=0, complete=False)
     write_report(tmp_path, Study(study.comparison, complete=False))
