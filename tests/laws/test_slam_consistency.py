@@ -157,6 +157,6 @@ def test_first_estimates_give_a_lower_normalised_error_than_the_latest_ones(seen
     average = {}
     for first_estimates in (True, False):
         config = replace(KNOWN, first_estimates=first_estimates)
-        average[first_estimates] = average_nees([run(POOR, config, seed, seen, start) for seed in range(20)]).mean()
+        average[first_estimates] = average_nees([run(POOR, config, seed, seen, start) for seed in range(10)]).mean()
     assert average[True] < 5.0
     assert average[False] > 1.5 * average[True], average

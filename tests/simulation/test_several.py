@@ -102,8 +102,9 @@ def test_the_first_messages_come_before_the_drive_is_over() -> None:
     assert {robot for robot, _ in islice(endless.messages(), 300)} == {0, 1, 2}
 
 
-@pytest.mark.parametrize(("name", "robots"), [("office_building", 3), ("office_corridor", 4)])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(
+    ("name", "robots", "seed"), [("office_building", 3, 0), ("office_building", 3, 1), ("office_corridor", 4, 0)]
+)
 def test_nobody_is_stuck_or_touched_in_two_minutes(name: str, robots: int, seed: int) -> None:
     config = SimulationConfig(duration=120.0)
     ways = true_ways(SeveralRobots(ROOMS[name], config, seed, robots, contact_free=True))
@@ -118,7 +119,7 @@ def test_nobody_is_stuck_or_touched_in_two_minutes(name: str, robots: int, seed:
 def test_on_their_wheels_robots_keep_off_each_other_and_off_everything(
     name: str, clearance: Callable[..., np.ndarray]
 ) -> None:
-    config = SimulationConfig(duration=20.0)
+    config = SimulationConfig(duration=12.0)
     ways = true_ways(SeveralRobots(ROOMS[name], config, 1, 5))
     assert nearest(ways) > BODIES + 0.05
     for height in (0.02, 0.1):
@@ -191,7 +192,7 @@ def test_a_beam_to_the_lidar_of_another_robot_gives_its_distance(
     clearance: Callable[..., np.ndarray], cast_ray: Callable[..., np.ndarray]
 ) -> None:
     room, head = ROOMS["furnished_room"], drums(ROBOT)[2]
-    config = SimulationConfig(duration=10.0, lidar=EXACT)
+    config = SimulationConfig(duration=5.0, lidar=EXACT)
     robots = SeveralRobots(room, config, 1, 3)
     messages = list(robots.messages())
     truth = [[m for k, m in messages if k == robot and isinstance(m, TruePose)] for robot in range(3)]
