@@ -50,7 +50,17 @@ PIECES_OF_ONE = "pieces of 25 m that share"
 Pair = tuple[Mapped, Mapped]
 UNRELATED = ("unrelated maps", "pairs", "joined", "closest call", "its doubt", "CPU s, mean / most")
 ALIKE = ("built to one plan", "pairs", "joined", "apart", "contradicted, least / most (%)", "its doubt, least / most")
-RELATED = ("maps of one building", "pairs", "joined", "joined wrongly", "apart", "ties off, median / 99 % (m)", "CPU s")
+VIEW = 8.0  # m of way; two drives that share less have seen little of each other's
+RELATED = (
+    "maps of one building",
+    "pairs",
+    f"share {VIEW:.0f} m of way",
+    "joined",
+    "joined wrongly",
+    "apart",
+    "ties off, median / 99 % (m)",
+    "CPU s",
+)
 
 
 class Maps:
@@ -280,6 +290,7 @@ def together(verdicts: Sequence[Verdict]) -> list[object]:
     wrong = sum(verdict.false for verdict in verdicts)
     return [
         len(verdicts),
+        sum(verdict.shared >= VIEW for verdict in verdicts),
         len(right),
         wrong,
         _why(verdicts),
