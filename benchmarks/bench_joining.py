@@ -330,6 +330,8 @@ def main() -> None:
             further.append([name, *together([judge(*pair) for pair in pairs])])
             print(*further[-1], flush=True)
     for name, verdicts in pieces_of_one(maps).items() if chosen.only in PIECES_OF_ONE else ():
+        if not verdicts:  # no two pieces happen to share so much
+            continue
         further.append([name, *together(verdicts)])
         print(*further[-1], flush=True)
     if not (chosen.seed or chosen.only):
