@@ -22,7 +22,7 @@ NAMES = [
     for source in sorted((FOLDER / "drawings").glob("*.py"))
     for name in re.findall(r"^def figure_(\w+)", source.read_text(), re.MULTILINE)
 ]
-SLOW = {"refined", "consistency"}  # a second or two each, and the site's own test draws them too
+SLOW = {"refined", "consistency", "error_bounds"}  # a second or more each, and the site's own test draws them too
 BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```)?", re.MULTILINE | re.DOTALL)
 ANY_BLOCK = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 

@@ -9,7 +9,7 @@ from contourslam.simulation.rooms import FURNISHED_ROOM
 
 
 def test_a_drive_through_part_of_the_room_gives_walls_in_their_own_colours():
-    config = SimulationConfig(duration=18.0)
+    config = SimulationConfig(duration=12.0)
     found = scene_accuracy(FURNISHED_ROOM, 0, config=config, rate=1.0, options=SceneOptions(height=2.4, texel=0.04))
     walls = [surface for surface in found.surfaces if surface.name.startswith("wall")]
     assert len(walls) >= 8
