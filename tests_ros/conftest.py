@@ -74,11 +74,12 @@ class Processes:
 
     def drive(self, observers: Iterable[Observer], *plans: dict[str, Any]) -> None:
         """Play as each plan says, all at once, when the nodes know who listens to them; until all have driven."""
-        begun = self._folder / f"begun_{len(self._running)}"
+        begun = self._folder / "begun"
         players = [self.play(begun=str(begun), **plan) for plan in plans]
         assert all(observer.knows_its_node() for observer in observers)
         begun.touch()
         assert [player.wait(200.0) for player in players] == [0] * len(players)
+        begun.unlink()
 
     def play(self, **choices: Any) -> "subprocess.Popen[str]":
         """Play the recording as a :class:`Plan` says, as soon as a node listens."""
