@@ -6,13 +6,13 @@ import sys
 import numpy as np
 
 from contourslam.fleet.facts import Answer
+from contourslam.fleet.rehearsal import rehearse_robot
 from contourslam.fleet.reporter import Reporter
 from contourslam.fleet.wire import decode, encode
 from contourslam.graph.slam import GraphSlam
 from contourslam.live.warming import warm_up
 from contourslam.scan import LaserScan, Odometry
 from contourslam.simulation.long_drive import building_drive
-from contourslam_ros.fleet_rehearsal import rehearse_robot
 from contourslam_ros.settings import Settings
 
 

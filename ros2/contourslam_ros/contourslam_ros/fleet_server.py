@@ -17,17 +17,17 @@ from rclpy.task import Future
 
 from contourslam.errors import ContourslamError, JournalError, MessageError
 from contourslam.fleet.inbox import Inbox
+from contourslam.fleet.rehearsal import rehearse
 from contourslam.fleet.server import FleetServer
 from contourslam.fleet.wire import encode
 from contourslam.maps.file import save_map
 from contourslam_ros.fleet_health import FleetHealth, State
 from contourslam_ros.fleet_maps import FleetMaps
-from contourslam_ros.fleet_rehearsal import rehearse
 from contourslam_ros.fleet_settings import FleetConfig
 from contourslam_ros.fleet_topics import QUALITY, REPORTS, answers_to, packet
 from contourslam_ros.messages import diagnostic_message, header
 from contourslam_ros.running import run
-from contourslam_ros.settings import declare
+from contourslam_ros.settings import Settings, declare
 
 MOST_WAITING = 10_000  # packets; robots send again what is lost
 RESTING = 1.0  # s between two looks while nothing comes
@@ -66,7 +66,7 @@ class Server(Node):
     def warm_up(self) -> None:
         """Compile what is needed, and take up what was kept."""
         self.get_logger().info("warming up, which takes minutes when it is the first time on this machine")
-        rehearse()
+        rehearse(Settings().core)
         self._server.flush(time.monotonic())
         kept = len(self._server.answers())
         if kept:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from contourslam.errors import ConfigError
+from contourslam.fleet.rehearsal import rehearse_robot
 from contourslam.live.session import Session
 from contourslam.live.start import mapping
 from contourslam_ros.fleet_link import FleetLink
-from contourslam_ros.fleet_rehearsal import rehearse_robot
 from contourslam_ros.live_node import LiveNode
 from contourslam_ros.running import run
 
