@@ -26,7 +26,7 @@ class WarmUp:
     A drive made up for it goes through mapping, localisation and the detectors, and a fleet is told of it; what is
     compiled on the way is cached for later processes of the same user, beside the package or in NUMBA_CACHE_DIR. Repeat
     it after an update of contourslam, Numba or Python. It takes a minute or two on a laptop, about five times that on a
-    Raspberry Pi, and up to 700 MB of memory, which no later start needs.
+    Raspberry Pi, and up to 800 MB of memory, which no later start needs.
 
     Example: contourslam warm-up
     """
