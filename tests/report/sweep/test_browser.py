@@ -14,12 +14,15 @@ from contourslam.report.sweep.reading import sweep_of
 pytest.importorskip("scipy")
 
 
-@pytest.fixture
-def page(sweep_rows: Callable[..., Any], log_rows: list[dict[str, Any]], tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def page(
+    sweep_rows: Callable[..., Any], log_rows: list[dict[str, Any]], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("report")
     sweep = sweep_of([*sweep_rows((0.8, 1.0, 1.0, 1.0), failed=[("wu", 0)]), *log_rows], ["name = 'a'"])
     measures = [MEASURES["position"], MEASURES["false_negatives"]]
-    write_sweep_report(tmp_path, Parts(sweep, measures, "contourslam sweep-report a -o b"))
-    return tmp_path / "index.html"
+    write_sweep_report(folder, Parts(sweep, measures, "contourslam sweep-report a -o b"))
+    return folder / "index.html"
 
 
 @pytest.mark.parametrize("width", [390, 1280])
