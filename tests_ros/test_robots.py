@@ -14,7 +14,7 @@ from contourslam.recordings.ros_messages import TRANSFORM, odometry_from
 from contourslam.simulation.simulate import SimulatedRun
 
 CLOSE = 0.1  # m
-PIECES = [[0.0, 15.0]]
+PIECES = [[0.0, 10.0]]
 # The same drive seen by another lidar, or told of by other means.
 PLANS = {
     "one": {"odometry": "tf", "yaw": math.pi / 2.0},
