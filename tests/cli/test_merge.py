@@ -224,7 +224,13 @@ def test_what_cannot_be_meant_is_refused_in_one_line(runs: tuple[Path, ...], tmp
     assert "is given twice" in failure(*words(runs[0], runs[0] / "map.cmap", *house))
     assert "is one of the maps itself" in failure(*words(*runs, "-o", runs[0] / "map.cmap", "--overwrite"))
     assert "the picture is a .svg file" in failure(*words(*runs, *house, "--picture", "house.bmp"))
-    assert "map.cmap" in failure(*words(runs[0], tmp_path, *house))
+    (tmp_path / "recording").mkdir()
+    assert "recording: holds no map.cmap" in failure(*words(runs[0], tmp_path / "recording", *house))
+    (tmp_path / "recording" / "metadata.yaml").touch()
+    assert "is a recording; map it first" in failure(*words(runs[0], tmp_path / "recording", *house))
+    assert "is a folder; name a file" in failure(*words(*runs, "-o", tmp_path / "recording", "--overwrite"))
+    again = failure(*words(*runs, *house, "--trajectories", tmp_path / "recording"))
+    assert "choose another folder with --trajectories" in again
 
 
 def test_a_map_that_cannot_be_joined_is_named(runs: tuple[Path, ...], tmp_path: Path, failure: Failure) -> None:

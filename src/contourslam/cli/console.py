@@ -90,7 +90,7 @@ def chosen(kind: str, name: str, choices: Mapping[str, T]) -> T:
     return choices[name]
 
 
-def prepare_folder(folder: Path, *, overwrite: bool) -> None:
+def prepare_folder(folder: Path, *, overwrite: bool, option: str = "--output") -> None:
     """Make the output folder; one that holds something is refused, so that no result is lost by a repeated command.
 
     Raises
@@ -104,7 +104,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
     except OSError as error:
         raise ResultError(f"{folder}: cannot be used as output folder ({error.strerror or error})") from error
     if used and not overwrite:
-        raise ResultError(f"{folder} is not empty; choose another folder with --output, or replace with --overwrite")
+        raise ResultError(f"{folder} is not empty; choose another folder with {option}, or replace with --overwrite")
 
 
 def keep_apart(output: Path, folders: Iterable[Path]) -> None:

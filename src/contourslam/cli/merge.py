@@ -13,7 +13,7 @@ from contourslam.atomic import make_folder, remove
 from contourslam.cli.console import Bar, complain, make_way, note, prepare_folder, print_json
 from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.cli.locate import UNSURE
-from contourslam.cli.options import Json, Overwrite
+from contourslam.cli.options import Flag, Json
 from contourslam.errors import ConfigError, MapError, ResultError
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class Merge:
     """Maps to join: map.cmap files, or folders that `contourslam run` wrote."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="MAP")]
     """File of the new map."""
-    overwrite: Overwrite = False
+    overwrite: Flag = False
+    """Replace the files that are there, and what the folder of --trajectories holds."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.svg")] = None
     """Draw the new map, with each map's way in a colour of its own; of further groups with -2, -3 in the name."""
     trajectories: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -56,7 +57,7 @@ class Merge:
 
     def execute(self, command: str) -> int:
         """Find the joints, solve each group, write the maps and say what was joined and why."""
-        paths = [path / _MAP if path.is_dir() else path for path in self.maps]
+        paths = [_map_in(path) if path.is_dir() else path for path in self.maps]
         names = self._checked(paths)
         maps = [_load(path) for path in paths]
         groups: list[Merged] = []
@@ -98,12 +99,14 @@ class Merge:
             for path in self._files(number):
                 if path.resolve() in [each.resolve() for each in paths]:
                     raise ConfigError(f"{path} is one of the maps itself; choose another file with --output")
+                if path.is_dir():
+                    raise ResultError(f"{path} is a folder; name a file in it or beside it")
                 make_way(path, overwrite=self.overwrite)
                 make_folder(path.parent)
                 if not os.access(path.parent, os.W_OK):
                     raise ResultError(f"{path.parent}: cannot be written; choose another folder")
         if self.trajectories is not None:
-            prepare_folder(self.trajectories, overwrite=self.overwrite)
+            prepare_folder(self.trajectories, overwrite=self.overwrite, option="--trajectories")
         return names
 
     def _files(self, number: int) -> list[Path]:
@@ -167,6 +170,15 @@ class Merge:
 
 def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}-{number + 1}{path.suffix}") if number else path
+
+
+def _map_in(folder: Path) -> Path:
+    """Give the map of a run's folder."""
+    if not (folder / _MAP).is_file():
+        recording = (folder / "metadata.yaml").is_file()
+        hint = f"is a recording; map it first: contourslam run {folder} -o FOLDER" if recording else f"holds no {_MAP}"
+        raise MapError(f"{folder}: {hint}")
+    return folder / _MAP
 
 
 def _load(path: Path) -> "SavedMap":

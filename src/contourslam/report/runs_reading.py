@@ -133,7 +133,7 @@ def distinct_names(folders: Sequence[Path]) -> list[str]:
     parts = [folder.resolve().parts for folder in folders]
     twice = next((folder for i, folder in enumerate(folders) if parts[i] in parts[:i]), None)
     if twice is not None:
-        raise ConfigError(f"{twice} is given twice; name each result folder once")
+        raise ConfigError(f"{twice} is given twice; name each once")
     names = []
     for own in parts:
         depth = 1
