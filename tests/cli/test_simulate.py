@@ -1,4 +1,5 @@
 import json
+import shlex
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from contourslam.cli import main
 from contourslam.cli.console import Bar
 from contourslam.cli.interrupt import INTERRUPTED
+from contourslam.cli.locate import UNSURE
 from contourslam.recordings import open_recording
 from contourslam.scan import LaserScan, TruePose
 
@@ -109,12 +111,26 @@ def test_several_robots_are_recorded_each_by_itself(tmp_path: Path, capsys: pyte
     assert sorted(path.name for path in (tmp_path / "fleet").iterdir()) == ["robot1", "robot2"]
 
 
+@pytest.mark.parametrize(("robots", "command"), [("1", "run"), ("2", "fleet")])
+def test_the_command_that_a_simulation_ends_with_works_as_it_stands(
+    robots: str, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = ["simulate", "-o", "out/my rooms", "--duration", "2", "--gliding", "--robots", robots]
+    for _ in range(2):  # what the first time wrote is no hindrance to the second
+        assert main([*told, "--overwrite"]) == 0
+        hint = shlex.split(capsys.readouterr().err.splitlines()[-1].rpartition(": ")[2])
+        assert hint[:2] == ["contourslam", command]
+        assert main(hint[1:]) in (0, UNSURE)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["--robots", "0"], "at least one robot, got 0"),
         (["--robots", "-2"], "at least one robot, got -2"),
         (["--robots", "99"], "furnished_room: 99 robots do not fit; "),
+        (["--robots", "99"], "a larger building: --room office_building with more --corridors"),
         (["--robots", "2", "--camera"], "--camera takes its pictures with one robot only"),
         (["--corridors", "3"], "--corridors says how large office_building is"),
         (["--corridors", "1", "--room", "office_building"], "corridors must be 2 to 40"),

@@ -1,6 +1,7 @@
 """What the commands say: results on standard output, everything about the work itself on standard error."""
 
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -105,6 +106,16 @@ def prepare_folder(folder: Path, *, overwrite: bool, option: str = "--output") -
         raise ResultError(f"{folder}: cannot be used as output folder ({error.strerror or error})") from error
     if used and not overwrite:
         raise ResultError(f"{folder} is not empty; choose another folder with {option}, or replace with --overwrite")
+
+
+def unused_folder(path: Path, what: str) -> str:
+    """Name an output folder that does not exist yet, for what is made of a recording, as a shell has it."""
+    name, number = f"{path.resolve().name.partition('.')[0]}-{what}", 1
+    folder = Path("out") / name
+    while folder.exists():
+        number += 1
+        folder = folder.with_name(f"{name}-{number}")
+    return shlex.quote(str(folder))
 
 
 def keep_apart(output: Path, folders: Iterable[Path]) -> None:

@@ -1,12 +1,13 @@
 """``contourslam info``: what is in a recording, and whether it can be mapped."""
 
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from contourslam.cli.console import print_json, progress
+from contourslam.cli.console import print_json, progress, unused_folder
 from contourslam.cli.interrupt import Interrupt, UntilStopped
 from contourslam.cli.options import Json
 
@@ -140,7 +141,8 @@ def _print(found: dict[str, Any]) -> None:
     if "scans" in found["missing"]:
         print("it holds no scan: it cannot be mapped")
     else:
-        print(f"map it with: contourslam run {found['recording']} -o out")
+        recording = found["recording"]
+        print(f"map it with: contourslam run {shlex.quote(recording)} -o {unused_folder(Path(recording), 'map')}")
 
 
 def _stream_line(stream: dict[str, Any]) -> str:

@@ -1,12 +1,13 @@
 """``contourslam simulate``: robots drive through a room, and their recordings."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from contourslam.cli.console import Bar, chosen, complain, make_way, note, print_json
+from contourslam.cli.console import Bar, chosen, complain, make_way, note, print_json, unused_folder
 from contourslam.cli.interrupt import INTERRUPTED, Interrupt
 from contourslam.cli.options import Flag, Json, Overwrite
 from contourslam.errors import ConfigError
@@ -121,7 +122,7 @@ class Simulate:
         else:
             shown = f", {pictures} pictures" if self.camera else ""
             print(f"{self.output}: {len(run.scans)} scans{shown}, {seconds:.0f} s in {room.name}")
-            note(f"map it with: contourslam run {self.output} -o out")
+            _say_how_to_map([self.output])
         return 0
 
     def _several(self, place: "Room | Building", room: "Room", config: "SimulationConfig") -> int:
@@ -151,11 +152,20 @@ class Simulate:
         else:
             for path, scans in zip(paths, done.scans, strict=True):
                 print(f"{path}: {scans} scans, {done.seconds:.0f} s in {room.name}")
-            note(f"map the first with: contourslam run {paths[0]} -o out")
+            _say_how_to_map(paths)
         if not done.complete:
             complain(f"interrupted; what is in {self.output} ends after {done.seconds:.1f} s")
             return INTERRUPTED
         return 0
+
+
+def _say_how_to_map(paths: list[Path]) -> None:
+    """Print a command that works as it stands."""
+    every = shlex.join(str(path) for path in paths)
+    if len(paths) == 1:
+        note(f"map it with: contourslam run {every} -o {unused_folder(paths[0], 'map')}")
+    else:
+        note(f"map them together with: contourslam fleet {every} -o {unused_folder(paths[0].parent, 'fleet')}")
 
 
 def _recordings_in(folder: Path) -> list[Path]:

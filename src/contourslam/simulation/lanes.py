@@ -86,7 +86,10 @@ def ways_of(place: Room | Building, robots: int, length: float, seed: int) -> tu
     if most < robots:
         while len(_starts(ways[:most], seed)) < most:
             most -= 1
-        raise ConfigError(f"room {room.name}: {robots} robots do not fit; {most} do")
+        raise ConfigError(
+            f"room {room.name}: {robots} robots do not fit; {most} do, and more in a larger building: --room "
+            "office_building with more --corridors"
+        )
     return ways, starts
 
 
