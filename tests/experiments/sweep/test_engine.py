@@ -1,6 +1,8 @@
 """What keeps a sweep from beginning is told in a line."""
 
 import contextlib
+import multiprocessing
+import signal
 import socket
 import subprocess
 import sys
@@ -69,6 +71,22 @@ def test_ctrl_c_ends_the_connecting(planned, tmp_path):
         stopped = Observer(stopped=lambda: True)
         found = sweep(planned(ROOM), Store(str(tmp_path)), scheduler=address, observer=stopped)
     assert found == Outcome(0, 0, False)
+
+
+def test_a_process_of_a_sweep_never_hears_ctrl_c_from_its_first_moment():
+    process = multiprocessing.get_context("spawn").Process(target=signal.raise_signal, args=(signal.SIGINT,))
+    engine._deaf_to_ctrl_c(process.start)
+    process.join(30.0)
+    assert process.exitcode == 0
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_why_processes_do_not_start_is_told_to_who_starts_them():
+    def fail():
+        raise OSError("too many processes")
+
+    with pytest.raises(OSError, match="too many"):
+        engine._deaf_to_ctrl_c(fail)
 
 
 def test_a_command_that_finds_no_scheduler_ends(tmp_path):

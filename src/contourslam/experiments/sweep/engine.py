@@ -4,10 +4,13 @@ import contextlib
 import logging
 import math
 import secrets
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any
 
 from contourslam.errors import ConfigError, ContourslamError
@@ -93,6 +96,8 @@ def sweep(
         if not reach(scheduler, _PATIENCE, observer.stopped):
             return Outcome(0, 0, False)
     with _client(min(jobs or cores(), len(runs)), scheduler) as client:
+        if observer.stopped():
+            return Outcome(0, 0, False)
         threads = _check_workers(client, scheduler)
         return _Session(client, store, observer, say).do(pieces(runs, threads))
 
@@ -202,10 +207,10 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
         return
     # A nanny starts a worker that died again, and again; the cluster must not give it up meanwhile.
     require("dask", "sweep").config.set({"distributed.deploy.lost-worker-timeout": "1 day"})
-    cluster = distributed.LocalCluster(
+    cluster = _deaf_to_ctrl_c(lambda: distributed.LocalCluster(
         n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL, env=_ONE_THREAD, preload=_PRELOAD,
-    )  # fmt: skip
+    ))  # fmt: skip
     try:
         client = distributed.Client(cluster, set_as_default=False)
         try:
@@ -214,6 +219,28 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
             _close(client)
     finally:
         cluster.close(timeout=_PATIENCE)
+
+
+def _deaf_to_ctrl_c(start: Callable[[], Any]) -> Any:
+    """Start processes that a terminal's Ctrl-C does not reach; it reaches this one alone, meanwhile too.
+
+    A new process has the signal mask of the thread that starts it. So it is deaf from its first moment, and not only
+    from where its preload is run.
+    """
+    resource_tracker.ensure_running()  # the first process would start it, and that takes the mask away
+    started: Future[Any] = Future()
+
+    def run() -> None:
+        if hasattr(signal, "pthread_sigmask"):  # not on Windows
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            started.set_result(start())
+        except BaseException as error:
+            started.set_exception(error)
+
+    # A thread that the process does not wait for: a second Ctrl-C ends at once.
+    threading.Thread(target=run, daemon=True).start()
+    return started.result()
 
 
 def _close(client: Any) -> None:
