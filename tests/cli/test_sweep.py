@@ -94,9 +94,18 @@ def test_compact_makes_the_table_and_runs_nothing(sweep, monkeypatch):
     assert Store("results").starts() == {}
 
 
-def test_results_of_another_experiment_are_left_alone(sweep):
+def test_compact_says_what_is_left_and_not_that_all_is_there(sweep):
     sweep(TEXT)
-    code, _, complaint = sweep(TEXT.replace("small", "large"))
+    code, said, notes = sweep(TEXT + "seeds = 3\n", "--compact")
+    assert (code, said.partition(": ")[2]) == (0, "1 of 3 runs done, 0 of them now\n")
+    assert notes == "contourslam: 2 of 3 runs are left; the same command without --compact does them\n"
+    assert not sweep(TEXT + "seeds = 3\n", "--compact", "--json")[1]["complete"]
+
+
+@pytest.mark.parametrize("words", [(), ("--dry-run",), ("--compact",)])
+def test_results_of_another_experiment_are_left_alone(sweep, words):
+    sweep(TEXT)
+    code, _, complaint = sweep(TEXT.replace("small", "large"), *words)
     assert code == 1
     assert "holds the results of 'small', not of 'large'" in complaint
 

@@ -60,6 +60,7 @@ class Sweep:
         experiment = read_experiment(self.experiment)
         runs = plan(experiment)
         store = Store(self.output)
+        store.check_name(experiment.name)
         there = store.status()
         for name in store.damaged[:_SHOWN]:
             note(f"{store.url}/{name} is damaged; its run counts as not done")
@@ -74,11 +75,20 @@ class Sweep:
             return self._say_cost(runs, todo, counts, store)
         store.write_experiment(experiment.name, experiment.text, [run.key for run in runs])
         if self.compact:
-            store.compact()
-            store.remove_starts()
-            todo = []
+            return self._compact(runs, store, len(todo))
         outcome = self._sweep(todo, store, counts)
         return self._report(runs, store, outcome)
+
+    def _compact(self, runs: "Sequence[Run]", store: "Store", left: int) -> int:
+        """Make the table of what there is, and say what is left."""
+        from contourslam.experiments.sweep.engine import Outcome
+
+        store.compact()
+        store.remove_starts()
+        code = self._report(runs, store, Outcome(0, 0, not left))
+        if left:
+            note(f"{left} of {len(runs)} runs are left; the same command without --compact does them")
+        return code
 
     def _sweep(self, todo: "Sequence[Run]", store: "Store", counts: dict[str, int]) -> "Outcome":
         """Do what is left, with a bar."""
@@ -129,7 +139,7 @@ class Sweep:
             complain(f"{names[key]}: {row['error_type']}: {row['error']}")
         if len(failed) > _SHOWN:
             complain(f"and {len(failed) - _SHOWN} more; they are rows whose status is failed")
-        if not outcome.complete:
+        if not outcome.complete and not self.compact:
             complain("interrupted; what is done is kept, and the same command goes on from there")
             return INTERRUPTED
         if failed:

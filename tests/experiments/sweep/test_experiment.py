@@ -30,7 +30,7 @@ ROOM = '[simulation]\nrooms = ["furnished_room"]\n'
         (ROOM + "speed = []\n", "line 4: simulation.speed: is empty"),
         (
             ROOM + "[settings.a]\nslam.wals = true\n",
-            "line 5: settings.a: unknown setting slam.wals; did you mean walls?",
+            "line 5: settings.a: unknown setting slam.wals; did you mean slam.walls?",
         ),
         (ROOM + "[settings.a]\nslam.walls = 1\n", "line 5: settings.a: slam.walls must be true or false"),
         (ROOM + "[settings.a.slam]\ngate_probability = 2.0\n", "gate_probability must lie between 0 and 1"),
@@ -54,11 +54,18 @@ def test_what_is_wrong_is_told_with_its_line_and_what_was_meant(written, text, s
     assert "experiment.toml" in str(error.value)
 
 
-@pytest.mark.parametrize("name", ["", "name = 3\n", 'name = "a/b"\n'])
+@pytest.mark.parametrize("name", ["name = 3\n", 'name = "a/b"\n'])
 def test_an_experiment_needs_a_name_that_is_one(tmp_path, name):
     path = tmp_path / "experiment.toml"
     path.write_text(name + ROOM)
     with pytest.raises(ConfigError, match="name: must be a name of letters"):
+        read_experiment(path)
+
+
+def test_an_empty_file_is_told_that_its_name_is_missing(tmp_path):
+    path = tmp_path / "experiment.toml"
+    path.write_text("")
+    with pytest.raises(ConfigError, match="name: is missing; give the experiment one"):
         read_experiment(path)
 
 

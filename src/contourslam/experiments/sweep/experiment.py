@@ -132,7 +132,9 @@ class _WrongError(Exception):
 
 def _experiment(content: dict[str, Any], text: str, folder: Path) -> Experiment:
     _known(content, _FILE, "")
-    name = content.get("name")
+    if "name" not in content:
+        raise _WrongError("", "name", 'is missing; give the experiment one, such as name = "small"')
+    name = content["name"]
     if not isinstance(name, str) or not re.fullmatch(r"[\w.-]+", name):
         raise _WrongError("", "name", f"must be a name of letters, digits, - and _, got {name!r}")
     own = _table(content, "own_detectors")
@@ -201,7 +203,9 @@ def _setting(name: str, given: Any) -> dict[str, Any]:
         build(Config, given)
     except ConfigError as error:
         key = re.sub(r"^unknown setting ", "", str(error)).partition(" ")[0].rstrip(";")
-        raise _InSettingError(place, key, str(error)) from error
+        # What was meant is told as it must be written here: with its table.
+        message = str(error).replace("did you mean ", f"did you mean {''.join(key.rpartition('.')[:2])}")
+        raise _InSettingError(place, key, message) from error
     return given
 
 

@@ -91,6 +91,18 @@ class Store:
                 f"{self.url}/experiment.json: is none of a sweep ({error!r}); remove it, or choose another folder"
             ) from error
 
+    def check_name(self, name: str) -> None:
+        """Refuse an experiment of another name than the one whose results are here.
+
+        Raises
+        ------
+        ResultError
+            If the results are another experiment's.
+        """
+        there = self.planned()
+        if there is not None and there.name != name:
+            raise ResultError(f"{self.url} holds the results of {there.name!r}, not of {name!r}; choose another folder")
+
     def write_experiment(self, name: str, text: str, keys: Sequence[str]) -> None:
         """Note which experiment this is and which runs belong to it.
 
@@ -99,9 +111,7 @@ class Store:
         ResultError
             If the results are another experiment's, or cannot be written.
         """
-        there = self.planned()
-        if there is not None and there.name != name:
-            raise ResultError(f"{self.url} holds the results of {there.name!r}, not of {name!r}; choose another folder")
+        self.check_name(name)
         self._place.write("experiment.json", json.dumps({"name": name, "text": text, "keys": list(keys)}).encode())
 
     def begin(self, session: str, key: str) -> int:
