@@ -36,7 +36,8 @@ def results(folder: Path, count: int = 6) -> Path:
 def test_it_writes_the_report_and_says_what_can_be_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     there, out, document = results(tmp_path / "there"), tmp_path / "out", tmp_path / "doc.md"
     assert main(["sweep-report", str(there), "-o", str(out), "--markdown", str(document)]) == 0
-    said = capsys.readouterr().out
+    said, note = capsys.readouterr()
+    assert "6 of 12 runs are missing; go on with the same `contourslam sweep` command" in note
     assert "No detector is shown to be better" in said and f"report: {out / 'index.html'}" in said
     assert EXPERIMENT.strip() in document.read_text() and "INCOMPLETE: 6 runs" in (out / "index.html").read_text()
 
@@ -47,6 +48,14 @@ def test_json_is_the_file_of_metrics(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((out / "metrics.json").read_text())
     assert (printed["metrics"], printed["runs"], printed["expected"]) == (["x"], 6, 12)
+
+
+def test_without_two_detectors_no_heading_stands_above_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep-report", str(results(tmp_path / "there", 1)), "-o", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "no two detectors can be compared" in said and "by the" not in said
 
 
 def test_several_results_are_reported_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

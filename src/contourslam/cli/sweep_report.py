@@ -5,7 +5,7 @@ from pathlib import Path
 
 import tyro
 
-from contourslam.cli.console import chosen, prepare_folder, print_json
+from contourslam.cli.console import chosen, note, prepare_folder, print_json
 from contourslam.cli.options import Json, Output, Overwrite
 from contourslam.errors import ConfigError
 
@@ -54,9 +54,17 @@ class SweepReport:
         if self.json:
             print_json(metrics)
         else:
-            for measure in measures:
-                print(f"by the {measure.title}:", *metrics["in_short"][measure.name], sep="\n  ")
+            said = {measure.title: found for measure in measures if (found := metrics["in_short"][measure.name])}
+            for title, found in said.items():
+                print(f"by the {title}:", *found, sep="\n  ")
+            if not said:
+                print("no two detectors can be compared: none were run with the same seeds in a simulated room")
             print(f"\nreport: {self.output / 'index.html'}")
+        if (missing := metrics["expected"] - metrics["runs"]) > 0:
+            note(
+                f"{missing} of {metrics['expected']} runs are missing; go on with the same "
+                "`contourslam sweep` command, then report again"
+            )
         return 0
 
     def _keep_out_of_results(self) -> None:

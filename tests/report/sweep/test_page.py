@@ -86,6 +86,10 @@ def test_few_drives_of_one_detector_are_reported_without_a_claim(sweep_rows, tmp
     assert all("better" not in line for line in metrics["findings"]["heading"])
     two = write_sweep_report(tmp_path, Parts(sweep_of(sweep_rows(seeds=2)), POSITION))
     assert "Too few seeds to show anything" in two["findings"]["position"][1]
+    assert "too few to show anything: 2 seeds, of 6 that two detectors" in two["in_short"]["position"][1]
+    page = (tmp_path / "index.html").read_text()
+    assert "under 5\N{NO-BREAK SPACE}drives" not in page and "under 5 drives it gets no interval" in page
+    assert "95\N{NO-BREAK SPACE}% interval</span>" not in page and "so none is drawn" in page
 
 
 def test_by_several_metrics_each_is_tested_and_the_first_is_drawn(sweep_rows, tmp_path: Path) -> None:
@@ -102,6 +106,18 @@ def test_recordings_alone_are_reported(log_rows, tmp_path: Path) -> None:
     metrics = write_sweep_report(tmp_path, Parts(sweep_of(log_rows), POSITION))
     assert metrics["findings"] == {"position": []} and len(metrics["recordings"]) == 4
     assert "no interval, no test" in (tmp_path / "index.html").read_text()
+
+
+def test_a_recording_is_judged_by_the_true_poses_that_it_holds(log_rows, tmp_path: Path) -> None:
+    held = {"rmse.x": 0.03, "rmse.y": 0.04, "odometry_rmse.x": 0.3, "odometry_rmse.y": 0.4}
+    truth = log_rows[0] | held | {"recording": "drive"}
+    write_sweep_report(tmp_path, Parts(sweep_of([*log_rows, truth]), POSITION))
+    rows = {row[0]: row[1:] for row in csv.reader((tmp_path / "tables" / "logs.csv").read_text().splitlines())}
+    assert rows["recording, setting, detector"][0] == "position (cm)"
+    assert rows["drive, graph, matched filter"][0] == "5.00" and rows["drive, raw odometry"][0] == "50.00"
+    assert rows["intel, graph, Wu"][:3] == ["", "1.60", "6.0"]
+    write_sweep_report(tmp_path, Parts(sweep_of(log_rows), POSITION))
+    assert "position" not in (tmp_path / "tables" / "logs.csv").read_text()
 
 
 def test_a_document_gets_the_report_in_its_places_and_keeps_its_words(sweep_rows, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Error of every detector along an axis of the sweep, with intervals."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -44,6 +45,11 @@ class Curves:
     conditions: tuple[Condition, ...]
     detectors: Mapping[str, tuple[Summary, ...]]
     odometry: tuple[Summary, ...]
+
+    @property
+    def intervals(self) -> bool:
+        """Whether any mean has an interval to be drawn."""
+        return any(math.isfinite(one.interval.low) for found in self.detectors.values() for one in found)
 
     @property
     def places(self) -> Floats:
@@ -110,8 +116,14 @@ def curves_drawing(found: Curves, measure: Measure, title: str) -> Drawing:
 def _span(values: Floats, *, logarithmic: bool) -> tuple[float, float]:
     known = values[np.isfinite(values)]
     if logarithmic:
-        return 0.85 * float(known.min()), 1.2 * float(known.max())
+        return 0.85 * float(known.min()), 1.05 * _tick_above(float(known.max()))
     return 0.0, 1.1 * max(float(known.max()), 1e-6)
+
+
+def _tick_above(value: float) -> float:
+    """First of 1, 2, 5, 10, 20, ... that is no smaller: so what is drawn lies between two numbers of the axis."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next((factor * power for factor in (1.0, 2.0, 5.0) if factor * power >= value), 10.0 * power)
 
 
 def colours(detectors: Sequence[str]) -> dict[str, str]:

@@ -5,12 +5,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from contourslam.evaluation.paired_tests import LEVEL
 from contourslam.report.naming import label
 from contourslam.report.paper import TABLE_I as PAPER
 from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import Pair
 
 T = TypeVar("T")
+
+_FEWEST_SEEDS = math.ceil(1.0 - math.log2(LEVEL))
+"""With which a signed-rank test alone can pass: if all agree, its two-sided p is 2 to the power of 1 - n."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +69,14 @@ def in_short(found: Sequence[Comparison], measure: Measure) -> list[str]:
     """
     of = f"{counted(len(found), 'comparison')} (a setting in a room, or in all rooms)"
     if not any(one.shown for one in found):
-        return [f"No detector is shown to be better than another in {of}."]
+        said = [f"No detector is shown to be better than another in {of}."]
+        if all(pair.test.verdict == "too few seeds" for one in found for pair in one.pairs):
+            most = counted(max(one.seeds for one in found), "seed")
+            said.append(
+                f"The seeds are too few to show anything: {most}, of {_FEWEST_SEEDS} that two detectors in one room "
+                "need even where all seeds agree; more detectors or rooms need more."
+            )
+        return said
     best = [(name, one) for one in found if (name := _alone(one, lambda pair: str(pair.better)))]
     worst = [(name, one) for one in found if (name := _alone(one, _loser))]
     said = [

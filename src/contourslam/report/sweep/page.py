@@ -25,6 +25,9 @@ from contourslam.report.sweep.values import Sweep
 _OWN = re.compile(r"(findings|table_one|paper|cells|matrix|pairs|logs|failures|noise|beams)(_.*)?\.(csv|tex|svg)")
 """What an earlier report may have left in ``tables/`` and ``figures/``."""
 
+_SHOWN = re.compile(r"<(?:th|td|li|p|span|h3|summary)\b[^>]*>[^<]+")
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:cm|mrad|ms|s|m|beams)\b|%)")
+
 
 def write_sweep_report(folder: Path, parts: Parts) -> dict[str, Any]:
     """Write ``index.html``, ``tables/``, ``figures/`` and ``metrics.json``.
@@ -55,7 +58,8 @@ def write_sweep_report(folder: Path, parts: Parts) -> dict[str, Any]:
     write_text(folder / "metrics.json", to_json(metrics))
     found = [part for part in parts.all() if part.items]
     sections = [
-        markup.Section(part.anchor, part.title, "\n".join(_html(item, folder) for item in part.items)) for part in found
+        markup.Section(part.anchor, part.title, _unbroken("\n".join(_html(item, folder) for item in part.items)))
+        for part in found
     ]
     missing = 0 if sweep.expected is None else sweep.expected - len(sweep.runs)
     text = markup.page(
@@ -135,10 +139,13 @@ def _lead(sweep: Sweep) -> str:
     if drives:
         said += f" over {counted(drives, 'simulated drive')} ({rooms})"
     if sweep.recorded:
-        said += (
-            f"{' and' if drives else ' over'} {counted(len({run.drive for run in sweep.recorded}), 'real recording')}"
-        )
+        said += f"{' and' if drives else ' over'} {counted(len({run.drive for run in sweep.recorded}), 'recording')}"
     return f"{said}. “Better” stands here only where a test that is corrected for the number of comparisons says so."
+
+
+def _unbroken(html: str) -> str:
+    """Keep numbers and their units on one line, in what is shown; what is copied stays as it is."""
+    return _SHOWN.sub(lambda text: _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text[0]), html)
 
 
 def _html(item: Item, folder: Path) -> str:

@@ -5,12 +5,13 @@ import re
 from collections.abc import Sequence
 from itertools import product
 
+from contourslam.evaluation.paired_tests import FEWEST
 from contourslam.report.naming import label
 from contourslam.report.sweep import findings, tables
-from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Part, Points, Table, Words
+from contourslam.report.sweep.content import Chart, Charts, Code, Folded, Heading, Item, Part, Points, Words
 from contourslam.report.sweep.figures import AxisName, curves, curves_drawing
 from contourslam.report.sweep.findings import Comparison
-from contourslam.report.sweep.measures import MEASURES, Measure
+from contourslam.report.sweep.measures import Measure
 from contourslam.report.sweep.statistics import Tests, pairs, summary
 from contourslam.report.sweep.values import Sweep, once
 
@@ -153,7 +154,7 @@ class Parts:
         if sweep.recorded:
             names = once(run.drive.place for run in sweep.recorded)
             settings = once(label(run.condition.setting) for run in sweep.recorded)
-            said.append(f"Real recordings: {', '.join(names)}; {', '.join(settings)}.")
+            said.append(f"Recordings: {', '.join(names)}; {', '.join(settings)}.")
         return Part("design", "What was run", [Points(said)])
 
     def _varied(self, setting: str) -> str:
@@ -167,7 +168,7 @@ class Parts:
         lengths = sorted({run.row.get("duration") or 0.0 for run in mine})
         parts = (
             ", ".join(map(label, rooms)),
-            " or ".join(map(str, sorted(seeds))) + " seeds a room",
+            " or ".join(map(str, sorted(seeds))) + (" seed" if seeds == {1} else " seeds") + " a room",
             "drives of " + ", ".join(f"{each:g} s" if each else "two laps, 180 s at least" for each in lengths),
             "noise " + (", ".join(f"{value:g}" for value in noise) + " cm" if noise else "the lidar's own"),
             ", ".join(map(str, sorted({run.condition.beams for run in mine if run.condition.beams is not None})))
@@ -192,7 +193,7 @@ class Parts:
         first, *others = self.measures
         items = self._drawn(first, axis)
         if items:
-            items.append(Words("Points: means over the drives; strokes: their 95 % intervals.", note=True))
+            items.append(Words(self._legend(axis), note=True))
         for measure in others:
             if more := self._drawn(measure, axis):
                 items.append(Folded(f"By the {measure.title}", more))
@@ -200,6 +201,17 @@ class Parts:
             cells = [tables.cells_table(self.sweep, first, setting) for setting in self.sweep.settings]
             items.append(Folded("Every cell as a table", cells))
         return Part(axis, title, items)
+
+    def _legend(self, axis: AxisName) -> str:
+        """Say what the drawings of the first measure hold: intervals only where there are drives enough for one."""
+        drawn = (
+            curves(self.sweep, self.measures[0], room, setting, axis)
+            for setting in self.sweep.settings
+            for room in self.sweep.rooms
+        )
+        if any(found is not None and found.intervals for found in drawn):
+            return "Points: means over the drives; strokes: their 95 % intervals."
+        return f"Points: means over the drives. Under {FEWEST} drives a mean gets no interval, so none is drawn."
 
     def _drawn(self, measure: Measure, axis: AxisName) -> list[Item]:
         items: list[Item] = []
@@ -240,8 +252,8 @@ class Parts:
         sweep, of = self.sweep, f"{label(setting)}, by {measure.title}"
         together, apart = self.together[measure.name, setting], self.by_room[measure.name, setting]
         end, common = f"{measure.name}_{setting}", findings.counted(len(sweep.common(setting)), "condition")
-        share = f"{of}, all rooms and {common}: share of the seeds with which the row's detector is better"
-        every = f"{of}, all rooms and {common}"
+        every = f"{of}, {'all rooms' if len(sweep.rooms) > 1 else label(sweep.rooms[0])} and {common}"
+        share = f"{every}: share of the seeds with which the row's detector is better"
         table = tables.pairs_table(together, measure, f"pairs_{end}", every)
         items: list[Item] = [tables.matrix_table(sweep, together, f"matrix_{end}", share)]
         items.append(table if measure is self.measures[0] else Folded(f"{of}: the tests", [table]))
@@ -257,14 +269,14 @@ class Parts:
 
     def _logs(self) -> Part:
         if not self.sweep.recorded:
-            return Part("logs", "Real recordings", [])
-        table: Table = tables.logs_table(self.sweep, [MEASURES["relations"], MEASURES["turns"]])
+            return Part("logs", "Recordings", [])
+        table = tables.logs_table(self.sweep)
         words = Words(
             "A recording is one drive and the replay of it has no chance in it: one number each, no interval, no test. "
             "A difference between two detectors here can be luck.",
             note=True,
         )
-        return Part("logs", "Real recordings", [table, words])
+        return Part("logs", "Recordings", [table, words])
 
     def _failures(self) -> Part:
         if not self.sweep.failed:

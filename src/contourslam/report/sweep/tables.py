@@ -1,8 +1,9 @@
 """The tables of the report, row by row."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from contourslam.evaluation.paired_tests import FEWEST
 from contourslam.report.naming import label
 from contourslam.report.page.markup import Cell, Row
 from contourslam.report.paper import TABLE_I as PAPER
@@ -13,6 +14,7 @@ from contourslam.report.sweep.statistics import Pair, Tests, summary, wheels
 from contourslam.report.sweep.values import Condition, Summary, Sweep
 
 _NO_INTERVAL = ("nees", "time")
+_BY_POSES, _BY_RELATIONS = ("position", "heading"), ("relations", "turns")
 _PAPER = (("x", 100.0, 1), ("y", 100.0, 1), ("theta", 1e3, 0))
 
 
@@ -36,11 +38,14 @@ def table_one(sweep: Sweep, measures: Sequence[Measure], setting: str, condition
                 rows.append(Row(f"{label(room)}, {label(name)}", [*shown, runs, *better]))
         odometry = [shown_mean(columns[i], wheels(sweep, columns[i], room, condition)) for i in kept]
         if any(cell.text != "–" for cell in odometry):
-            rows.append(Row(f"{label(room)}, raw odometry", [*odometry, *[Cell("")] * (1 + len(measures))], aside=True))
+            rows.append(
+                Row(f"{label(room)}, raw odometry", [*odometry, *[Cell("–")] * (1 + len(measures))], aside=True)
+            )
     headers = ["room, detector", *(columns[i].column for i in kept), "drives"]
     headers += [f"by {one.short} better than" for one in measures]
     what = "RMSE of position, x, y and heading, and what else was measured"
-    caption = f"{label(setting)}, {condition.name}. {what}: mean over the drives and its 95 % interval"
+    means = _mean_over_drives(one for found in cells.values() for one in found)
+    caption = f"{label(setting)}, {condition.name}. {what}: {means}"
     return Table(f"table_one_{setting}", caption, headers, rows)
 
 
@@ -63,16 +68,20 @@ def paper_table() -> Table:
 
 def cells_table(sweep: Sweep, measure: Measure, setting: str) -> Table:
     """Every cell of a setting by one measure."""
-    rows = [
-        Row(
-            f"{label(room)}, {condition.name}",
-            [shown_mean(measure, summary(sweep, measure, room, condition, name)) for name in sweep.detectors]
-            + [shown_mean(measure, wheels(sweep, measure, room, condition))],
-        )
+    cells = {
+        (room, condition): [
+            *(summary(sweep, measure, room, condition, name) for name in sweep.detectors),
+            wheels(sweep, measure, room, condition),
+        ]
         for room in sweep.rooms
         for condition in sweep.conditions(setting)
+    }
+    rows = [
+        Row(f"{label(room)}, {condition.name}", [shown_mean(measure, one) for one in found])
+        for (room, condition), found in cells.items()
     ]
-    caption = f"{label(setting)}: {measure.heading}, mean over the drives and its 95 % interval"
+    means = _mean_over_drives(one for found in cells.values() for one in found)
+    caption = f"{label(setting)}: {measure.heading}, {means}"
     return Table(f"cells_{setting}", caption, ["cell", *map(label, sweep.detectors), "raw odometry"], rows)
 
 
@@ -127,8 +136,16 @@ def matrix_table(sweep: Sweep, found: Sequence[Pair], name: str, caption: str) -
     return Table(name, caption, ["better than", *map(label, sweep.detectors)], rows)
 
 
-def logs_table(sweep: Sweep, measures: Sequence[Measure]) -> Table:
-    """Real recordings: one drive each, raw odometry beside."""
+def logs_table(sweep: Sweep) -> Table:
+    """Recordings: one drive each, raw odometry beside, by what is known of any of them."""
+    known = {
+        name
+        for name in (*_BY_POSES, *_BY_RELATIONS)
+        if any(math.isfinite(MEASURES[name].of(run.row)) for run in sweep.recorded)
+    }
+    by_poses = [name for name in _BY_POSES if name in known]
+    by_relations = [name for name in _BY_RELATIONS if name in known or not by_poses]
+    measures = [MEASURES[name] for name in (*by_poses, *by_relations)]
     headers = ["recording, setting, detector", *(measure.column for measure in measures), MEASURES["time"].column]
     rows = []
     for place in dict.fromkeys(run.drive.place for run in sweep.recorded):
@@ -143,7 +160,9 @@ def logs_table(sweep: Sweep, measures: Sequence[Measure]) -> Table:
         if whole := [run for run in runs if not run.error]:
             odometry = [Cell(measure.text(measure.of_odometry(whole[0].row))) for measure in measures]
             rows.append(Row(f"{place}, raw odometry", [*odometry, Cell("–")], aside=True))
-    return Table("logs", "Real recordings: mean error over hand-verified relative poses; one drive each", headers, rows)
+    against = ["RMSE against the true poses that a recording holds"] * bool(by_poses)
+    against += ["mean error over known relative poses"] * bool(by_relations)
+    return Table("logs", f"Recordings: {', and '.join(against)}; one drive each", headers, rows)
 
 
 def failures_table(sweep: Sweep) -> Table:
@@ -159,6 +178,13 @@ def failures_table(sweep: Sweep) -> Table:
         for (place, name, where, error), count in causes.items()
     ]
     return Table("failures", "Failed runs by their cause", ["place, detector", "condition", "runs", "cause"], rows)
+
+
+def _mean_over_drives(found: Iterable[Summary]) -> str:
+    """What the numbers of a table are: with an interval only where the drives are enough for one."""
+    if any(math.isfinite(one.interval.low) for one in found):
+        return "mean over the drives and its 95 % interval"
+    return f"mean over the drives; under {FEWEST} drives it gets no interval"
 
 
 def shown_mean(measure: Measure, found: Summary) -> Cell:
