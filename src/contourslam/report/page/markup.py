@@ -68,13 +68,21 @@ def paragraph(text: str, kind: str = "") -> str:
     return f"<p{attribute}>{escape(text)}</p>"
 
 
-def table(caption: str, headers: Sequence[str], rows: Sequence[Row], *, stacked: bool = False) -> str:
+def table(
+    caption: str, headers: Sequence[str], rows: Sequence[Row], *, stacked: bool = False, words: Sequence[str] = ()
+) -> str:
     """Give a table with a caption and header cells, to be copied as CSV or LaTeX; it scrolls where it is too wide.
 
-    One that is stacked is made narrow: heads and long cells are wrapped, small print stands below its number.
+    One that is stacked is made narrow: heads and long cells are wrapped, small print stands below its number. Columns
+    whose heads are among `words` hold no numbers and begin at the left.
     """
-    head = "".join(f'<th scope="col">{escape(header)}</th>' if header else "<td></td>" for header in headers)
-    body = "\n".join(_row(row) for row in rows)
+    left = ' class="left"'
+    head = "".join(
+        f'<th scope="col"{left * (header in words)}>{escape(header)}</th>' if header else "<td></td>"
+        for header in headers
+    )
+    lefts = [number for number, header in enumerate(headers[1:]) if header in words]
+    body = "\n".join(_row(row, lefts) for row in rows)
     return (
         f'<div class="wide{" stacked" * stacked}" tabindex="0" role="region" aria-label="{escape(caption)}"><table>\n'
         f"<caption><span>{escape(caption)}</span></caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>\n"
@@ -89,16 +97,19 @@ def _copy(form: str, text: str) -> str:
     return f'<button type="button" data-text="{held}">Copy as {form}</button>'
 
 
-def _row(row: Row) -> str:
+def _row(row: Row, lefts: Sequence[int]) -> str:
     kind = ' class="aside"' if row.aside else ""
-    return f'<tr{kind}><th scope="row">{escape(row.name)}</th>{"".join(map(_cell, row.cells))}</tr>'
+    cells = "".join(_cell(cell, left=number in lefts) for number, cell in enumerate(row.cells))
+    return f'<tr{kind}><th scope="row">{escape(row.name)}</th>{cells}</tr>'
 
 
 _LONG = 16  # characters from which a cell is words to be wrapped where the table is stacked
 
 
-def _cell(cell: Cell) -> str:
-    kind = ' class="better"' if cell.better else ' class="words"' if len(cell.text) > _LONG else ""
+def _cell(cell: Cell, *, left: bool) -> str:
+    kinds = ["better"] * cell.better or ["words"] * (len(cell.text) > _LONG)
+    kinds += ["left"] * left
+    kind = f' class="{" ".join(kinds)}"' if kinds else ""
     small = f" <small>{escape(cell.small)}</small>" if cell.small else ""
     return f"<td{kind}>{escape(cell.text)}{small}</td>"
 

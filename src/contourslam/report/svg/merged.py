@@ -15,7 +15,9 @@ _WAYS = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
 _MOST_POINTS = 60_000  # of contours: the eye cannot tell more
 
 
-def merged_drawing(saved: SavedMap, names: Sequence[str], keys: Sequence[Ints]) -> Drawing:
+def merged_drawing(
+    saved: SavedMap, names: Sequence[str], keys: Sequence[Ints], colours: Sequence[int] | None = None
+) -> Drawing:
     """Draw contours, walls and corners, and over them the ways, each a layer; a dot is where each drive begins.
 
     Parameters
@@ -26,6 +28,8 @@ def merged_drawing(saved: SavedMap, names: Sequence[str], keys: Sequence[Ints]) 
         Of the maps that it was made of.
     keys : sequence of ndarray of int
         Keyframes of each.
+    colours : sequence of int, optional
+        Which colour each gets, so that it has the same one in other drawings; in their order by default.
     """
     keyframes = saved.keyframes
     assert keyframes is not None
@@ -40,7 +44,7 @@ def merged_drawing(saved: SavedMap, names: Sequence[str], keys: Sequence[Ints]) 
         if len(saved.corners.ids):
             axes.squares(saved.corners.positions, GREY, GREY, 3.4)
     legend = [("contour", FAINT, "contours", True), ("wall, corner", GREY, "landmarks", True)]
-    for number, (name, own) in enumerate(zip(names, keys, strict=True)):
+    for number, name, own in zip(range(len(names)) if colours is None else colours, names, keys, strict=True):
         colour, layer = _WAYS[number % len(_WAYS)], f"way{number}"
         with axes.layer(layer):
             _ways(axes, saved, own, colour)
