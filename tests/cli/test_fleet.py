@@ -1,15 +1,20 @@
 """``contourslam fleet``."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from contourslam.cli.entry import main
+from contourslam.cli.locate import UNSURE
 from contourslam.maps import load_map
-from contourslam.recordings import read_trajectory
+from contourslam.recordings import read_trajectory, write_recording
 from contourslam.report import fleet_folder
+from contourslam.report.svg.colours import BLUE
+from contourslam.scan import evenly_spaced
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +75,70 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_played(
             assert f"{option} {after}: a program begins anew" in said
     assert "choose another folder" in failure("fleet", *robots, "-o", robots[1], "--overwrite")
     assert not (tmp_path / "out").exists()
+
+
+def halved(recording: str, to: Path, part: float = 0.5) -> str:
+    """A recording of which the end is missing."""
+    shutil.copytree(recording, to)
+    (file,) = to.glob("*.mcap")
+    content = file.read_bytes()
+    file.write_bytes(content[: int(part * len(content))])
+    return str(to)
+
+
+def test_a_robot_whose_recording_is_damaged_stops_there_and_the_others_go_on(
+    robots: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = halved(robots[1], tmp_path / "cut")
+    assert main(["fleet", robots[0], cut, "-o", str(tmp_path / "out"), "--json"]) == 1
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    whole, half = told["robots"]
+    assert (whole["scans"], whole["damage"]) == (400, "")
+    assert 0 < half["scans"] < 400
+    assert not told["complete"]
+    page = (tmp_path / "out" / "index.html").read_text()
+    for text in (said.err, page):
+        assert "cut.mcap" in text or "robot2.mcap" in text
+    assert f"Incomplete: cut stopped after {half['scans']} scans" in page
+    assert f"the {half['scans']} scans before it are in" in said.err
+
+
+def test_a_recording_of_which_nothing_can_be_read_is_refused_before_anything_is_written(
+    robots: list[str], tmp_path: Path, failure: Callable[..., str]
+) -> None:
+    nothing = halved(robots[1], tmp_path / "cut", 0.001)
+    assert "cut" in failure("fleet", robots[0], nothing, "-o", tmp_path / "out")
+    assert "is given twice" in failure("fleet", robots[0], robots[0], "-o", tmp_path / "out")
+    folder = Path(robots[0]).parent
+    said = failure("fleet", folder, "-o", tmp_path / "out")
+    assert f"a folder of 2; name them: contourslam fleet {' '.join(robots)} -o {tmp_path / 'out'}" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_why_common_maps_stay_apart_and_what_the_recordings_lack_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, far in (("one", 2.0), ("two", 4.0)):
+        beams = np.linspace(far, far + 1.0, 90)
+        scans = [
+            evenly_spaced(0.1 * k, beams, angle_min=-1.5, angle_increment=1 / 30, range_min=0.1, range_max=10.0)
+            for k in range(3)
+        ]
+        write_recording(tmp_path / name, scans)
+    asked = ["fleet", str(tmp_path / "one"), str(tmp_path / "two"), "-o", str(tmp_path / "out")]
+    assert main(asked) == UNSURE
+    said = capsys.readouterr()
+    assert "common1 (one) and common2 (two) stay apart, nothing alike" in said.out
+    assert all(f"{name}: " in said.err for name in ("one", "two"))
+    assert said.err.count("the scans alone must do") == 2
+    (apart,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["apart"]
+    assert apart == {"maps": [1, 2], "reason": "nothing alike", "best": None}
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert all(word in page for word in ("Who stays apart, and why", "nothing alike", "hold no true poses"))
+    assert "root mean squares" not in page
+    drawn = [(tmp_path / "out" / f"common{number}.svg").read_text() for number in (1, 2)]
+    assert BLUE in drawn[0] and BLUE not in drawn[1]  # a colour is one robot's on the whole page
 
 
 def test_a_page_shows_the_faults_that_there_were_and_no_word_where_there_were_none() -> None:

@@ -9,6 +9,7 @@ from time import process_time
 import numpy as np
 
 from contourslam.config import Config
+from contourslam.errors import RecordingError
 from contourslam.fleet.channel import Air
 from contourslam.fleet.common import Joined
 from contourslam.fleet.faults import Fault
@@ -39,6 +40,8 @@ class Fleet:
         CPU time of the maps' last solution.
     restarts : int
         How often the server's program died and began anew.
+    complete : bool
+        Whether all recordings were played to their end.
     """
 
     robots: tuple[Played, ...]
@@ -48,6 +51,7 @@ class Fleet:
     seconds: float
     solving: float
     restarts: int
+    complete: bool = True
 
 
 class _Server:
@@ -101,6 +105,8 @@ def play(
 ) -> Fleet:
     """Play robots side by side, each from its own first message on, to one server.
 
+    A robot whose recording is damaged stops there; the others go on.
+
     Parameters
     ----------
     players : sequence of Player
@@ -122,12 +128,14 @@ def play(
     Raises
     ------
     ContourslamError
-        If a recording or the folder cannot be read.
+        If the folder cannot be read.
     """
     robots = [Robot(player, i, config, air or Air(), seed) for i, player in enumerate(players)]
     server = _Server(robots, config, folder, server_restarts)
     now = 0.0
-    for now, number, message in heapq.merge(*(_timed(i, p.messages) for i, p in enumerate(players)), key=_order):
+    for now, number, message in heapq.merge(
+        *(_timed(i, p.messages, robots[i].played) for i, p in enumerate(players)), key=_order
+    ):
         robots[number].take(now, message)
         server.work(now)
     for robot in robots:
@@ -152,16 +160,20 @@ def play(
         server.seconds + solving - before,
         ended - solving,
         server.restarts,
+        not any(robot.played.damage for robot in robots),
     )
 
 
-def _timed(number: int, messages: Iterable[Message]) -> Iterator[tuple[float, int, Message]]:
-    """Messages with the time since the first one, which never goes back."""
+def _timed(number: int, messages: Iterable[Message], played: Played) -> Iterator[tuple[float, int, Message]]:
+    """Messages with the time since the first one, which never goes back, up to the damage."""
     begin = now = -np.inf
-    for message in messages:
-        begin = message.stamp if begin == -np.inf else begin
-        now = max(now, message.stamp - begin)
-        yield now, number, message
+    try:
+        for message in messages:
+            begin = message.stamp if begin == -np.inf else begin
+            now = max(now, message.stamp - begin)
+            yield now, number, message
+    except RecordingError as error:
+        played.damage = str(error)
 
 
 def _order(timed: tuple[float, int, Message]) -> float:

@@ -87,6 +87,8 @@ class Played:
         To the server and back.
     restarts : int
         How often its program died and began anew.
+    damage : str
+        What ended its recording early; empty where nothing did.
     """
 
     name: str
@@ -95,6 +97,7 @@ class Played:
     told: list[Told] = field(default_factory=list)
     truth: list[TruePose] = field(default_factory=list)
     restarts: int = 0
+    damage: str = ""
 
     @property
     def shift(self) -> float:

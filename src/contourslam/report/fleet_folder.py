@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,13 @@ from contourslam import __version__
 from contourslam.atomic import make_folder, remove, write_text
 from contourslam.display import metres
 from contourslam.fleet.play import Fleet
+from contourslam.fleet.play_apart import KeptApart
 from contourslam.fleet.shared import Shared
 from contourslam.fleet.wire import NAME
 from contourslam.maps import save_map
 from contourslam.recordings import write_trajectory
 from contourslam.report.fleet_metrics import fleet_metrics, home
+from contourslam.report.joints import apart_in_words
 from contourslam.report.page import album
 from contourslam.report.page.markup import Cell, Row, Section, page, paragraph, table, tiles, verbatim
 from contourslam.report.result_folder import to_json
@@ -31,7 +34,9 @@ def map_file(shared: Shared) -> str:
     return f"common{shared.number}.cmap"
 
 
-def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict[str, Any]:
+def write_fleet_folder(
+    folder: Path, fleet: Fleet, apart: Sequence[KeptApart] = (), *, command: str = ""
+) -> dict[str, Any]:
     """Write what came of a fleet, and give its metrics.
 
     The folder gets index.html, metrics.json, a map (commonN.cmap) and a picture (commonN.svg) of each common map, and
@@ -43,6 +48,8 @@ def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict
     folder : Path
         Made where needed.
     fleet : Fleet
+    apart : sequence of KeptApart
+        Why common maps are two.
     command : str
         The command line, shown as it stands.
 
@@ -58,12 +65,13 @@ def write_fleet_folder(folder: Path, fleet: Fleet, *, command: str = "") -> dict
     """
     make_folder(folder)
     _clear(folder)
-    metrics = fleet_metrics(fleet)
+    metrics = fleet_metrics(fleet, apart)
+    numbers = {robot.name: number for number, robot in enumerate(fleet.robots)}
     about = {"contourslam": __version__, "command": command}
     drawings = []
     for shared in fleet.maps:
         save_map(folder / map_file(shared), replace(shared.saved, about=shared.saved.about | about))
-        drawings.append(_drawing(shared))
+        drawings.append(_drawing(shared, numbers))
         write_text(folder / map_file(shared).replace(".cmap", ".svg"), drawings[-1].text)
     for robot in fleet.robots:
         shared_map = home(robot, fleet) if robot.told else None
@@ -93,14 +101,15 @@ def _clear(folder: Path) -> None:
             remove(folder / f"{name}_online.tum")
 
 
-def _drawing(shared: Shared) -> Drawing:
-    """Draw a common map with the ways of its robots; the runs of one that began anew have one colour."""
+def _drawing(shared: Shared, numbers: dict[str, int]) -> Drawing:
+    """Draw a common map with the ways of its robots, each in the colour of its number, whatever map it is in."""
     ends = np.cumsum([0, *shared.counts])
     names = sorted({name for name, _ in shared.members})
     own = {name: [np.empty(0, np.int64)] for name in names}
     for (name, _), begin, end in zip(shared.members, ends, ends[1:], strict=False):
         own[name].append(np.arange(begin, end))
-    return merged_drawing(shared.saved, names, [np.concatenate(own[name]) for name in names])
+    keys = [np.concatenate(own[name]) for name in names]
+    return merged_drawing(shared.saved, names, keys, [numbers[name] for name in names])
 
 
 def _page(fleet: Fleet, metrics: dict[str, Any], drawings: list[Drawing], command: str) -> str:
@@ -109,6 +118,7 @@ def _page(fleet: Fleet, metrics: dict[str, Any], drawings: list[Drawing], comman
         *(_map(shared, one, drawing) for shared, one, drawing in zip(fleet.maps, maps, drawings, strict=True)),
         _robots(robots),
         _joined(metrics),
+        _apart(metrics),
         _faults(metrics["faults"]),
         Section("command", "Made by", verbatim(command)) if command else None,
     ]
@@ -119,9 +129,18 @@ def _page(fleet: Fleet, metrics: dict[str, Any], drawings: list[Drawing], comman
         f"{'map' if len(maps) == 1 else 'maps'} came of it.",
         summary=_headline(robots, together),
         sections=[section for section in sections if section is not None],
+        banner=_incomplete(metrics),
         footer=f"Written by contourslam {__version__}.",
         scripts=album.SCRIPTS,
     )
+
+
+def _incomplete(metrics: dict[str, Any]) -> str:
+    """Say what was not played to its end; nothing where all was."""
+    if metrics["complete"]:
+        return ""
+    cut = [f"{r['name']} stopped after {r['scans']} scans ({r['damage']})" for r in metrics["robots"] if r["damage"]]
+    return f"Incomplete: {'; '.join(cut) or 'interrupted before the recordings had ended'}."
 
 
 def _headline(robots: list[dict[str, Any]], together: int) -> str:
@@ -154,25 +173,41 @@ def _robots(robots: list[dict[str, Any]]) -> Section:
     headers = [
         "robot", "common map", "error", "as known at the time", "raw odometry", "told from", "messages", "bytes/s",
     ]  # fmt: skip
+    errors = [_lengths([robot[error] for robot in robots]) for error in _ERRORS]
     rows = [
         Row(
             robot["name"],
             [
                 Cell(str(robot["common"])),
-                *(Cell("-" if robot[error] is None else metres(robot[error])) for error in _ERRORS),
+                *(Cell(column[number]) for column in errors),
                 Cell("-" if robot["told_from"] is None else f"{robot['told_from']:.0f} s"),
                 Cell(str(robot["messages"])),
                 Cell(f"{robot['bytes_per_second']:.0f}"),
             ],
         )
-        for robot in robots
+        for number, robot in enumerate(robots)
     ]
     words = paragraph(
-        "Errors are root mean squares of the distance from the true positions, after one rigid motion that lays all "
-        "robots of a common map on the world together. What was known at the time counts from when the robot was first "
-        "told of the common map that it ended in. Raw odometry begins at each robot's own true pose."
+        "Told from: when, since the begin, the robot first knew its place in the common map that it ended in. Messages "
+        "and bytes are those that it sent."
     )
+    if any(robot["rmse"] is not None for robot in robots):
+        words += paragraph(
+            "Errors are root mean squares of the distance from the true positions, after one rigid motion that lays "
+            "all robots of a common map on the world together. What was known at the time counts from when the robot "
+            "was told. Raw odometry begins at each robot's own true pose."
+        )
+    else:
+        del headers[2:5]
+        rows = [Row(row.name, [row.cells[0], *row.cells[4:]]) for row in rows]
+        words += paragraph("The recordings hold no true poses: there are no errors to tell.")
     return Section("robots", "Robots", words + table("The robots", headers, rows))
+
+
+def _lengths(values: list[float | None]) -> list[str]:
+    """Give the lengths of a column in one unit."""
+    small = all(value is None or value < 0.1 for value in values)
+    return ["-" if v is None else f"{1e3 * v:.1f} mm" if small else f"{v:.3f} m" for v in values]
 
 
 def _joined(metrics: dict[str, Any]) -> Section:
@@ -198,7 +233,7 @@ def _joined(metrics: dict[str, Any]) -> Section:
         )
         for event in metrics["joined"]
     ]
-    body = table("Joints and their evidence", headers, rows)
+    body = table("Joints and their evidence", headers, rows, words=["who", "by"])
     pairs = [pair for pair in metrics["met"] if pair["met"] is not None]
     if pairs:
         met = [
@@ -212,9 +247,33 @@ def _joined(metrics: dict[str, Any]) -> Section:
     return Section("joined", "Who was joined", body)
 
 
+def _apart(metrics: dict[str, Any]) -> Section | None:
+    if not metrics["apart"]:
+        return None
+    members = {one["common"]: ", ".join(one["members"]) for one in metrics["maps"]}
+    rows = [
+        Row(" and ".join(f"{number} ({members[number]})" for number in each["maps"]), [Cell(apart_in_words(each))])
+        for each in metrics["apart"]
+    ]
+    words = paragraph(
+        "The common maps at the end, held against each other as contourslam merge does. Too little: what is alike "
+        "would fit many buildings. Ambiguous: another way of laying them fits about as well. Contradicted: one map saw "
+        "through the other's walls. Enough to merge: contourslam merge joins them, a server asks for more."
+    )
+    return Section(
+        "apart",
+        "Who stays apart, and why",
+        words + table("Common maps that stay apart", ["common maps", "why"], rows, stacked=True, words=["why"]),
+    )
+
+
 def _faults(faults: list[dict[str, Any]]) -> Section | None:
     if not faults:
         return None
     rows = [Row(fault["robot"] or "server", [Cell(f"{fault['run']:x}"), Cell(fault["text"])]) for fault in faults]
     words = paragraph("What robots told and could not be used, or was wrong with what the server had kept.")
-    return Section("faults", "Faults", words + table("Faults, the newest last", ["who", "run", "what"], rows))
+    return Section(
+        "faults",
+        "Faults",
+        words + table("Faults, the newest last", ["who", "run", "what"], rows, stacked=True, words=["run", "what"]),
+    )

@@ -1,6 +1,7 @@
 """What is measured about a fleet that was played: errors in the common frame, who was joined with whom, bytes."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import combinations
 from typing import Any
@@ -12,17 +13,20 @@ from contourslam.evaluation.errors import align_first, fit
 from contourslam.evaluation.fleet import met, rmse
 from contourslam.fleet.common import Joined
 from contourslam.fleet.play import Fleet
+from contourslam.fleet.play_apart import KeptApart
 from contourslam.fleet.play_robot import Played
 from contourslam.fleet.shared import Shared
 from contourslam.report.joints import joint_figures
 
 
-def fleet_metrics(fleet: Fleet) -> dict[str, Any]:
+def fleet_metrics(fleet: Fleet, apart: Sequence[KeptApart] = ()) -> dict[str, Any]:
     """Everything measured about a fleet, ready for metrics.json.
 
     Parameters
     ----------
     fleet : Fleet
+    apart : sequence of KeptApart
+        Why common maps are two.
 
     Returns
     -------
@@ -50,6 +54,8 @@ def fleet_metrics(fleet: Fleet) -> dict[str, Any]:
         ],
         "joined": [_of_joined(event) for event in fleet.joined],
         "met": [_of_pair(first, second, fleet) for first, second in combinations(begun, 2)],
+        "apart": [_of_apart(each) for each in apart],
+        "complete": fleet.complete,
         "faults": [asdict(fault) for fault in fleet.faults],
         "server_restarts": fleet.restarts,
         "server_seconds": fleet.seconds,
@@ -72,6 +78,7 @@ def _of_robot(robot: Played, fleet: Fleet) -> dict[str, Any]:
         "seconds": seconds,
         "runs": len({each.run for each in robot.told}),
         "restarts": robot.restarts,
+        "damage": robot.damage,
         "messages": robot.up.messages,
         "bytes": robot.up.size,
         "bytes_per_second": robot.up.size / max(seconds, 1e-9),
@@ -121,6 +128,11 @@ def _of_joined(event: Joined) -> dict[str, Any]:
         "joining": event.joining,
         **joint_figures(event.joint),
     }
+
+
+def _of_apart(each: KeptApart) -> dict[str, Any]:
+    best = None if each.best is None else joint_figures(each.best)
+    return {"maps": each.commons, "reason": each.reason, "best": best}
 
 
 def _of_pair(first: Played, second: Played, fleet: Fleet) -> dict[str, Any]:

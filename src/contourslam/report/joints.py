@@ -12,6 +12,11 @@ def joint_figures(joint: Joint) -> dict[str, Any]:
     return {"method": joint.method, "pose": joint.pose, "ties": len(joint.ties), **asdict(joint.evidence)}
 
 
+def apart_in_words(told: Mapping[str, Any]) -> str:
+    """Tell why two maps stay apart, from the reason and the best way of laying them, in a line."""
+    return told["reason"] if told["best"] is None else f"{told['reason']}: at best {evidence_in_words(told['best'])}"
+
+
 def evidence_in_words(figures: Mapping[str, Any]) -> str:
     """Tell the evidence among the figures of a joint in a line."""
     return (
