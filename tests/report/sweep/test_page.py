@@ -34,7 +34,7 @@ def test_better_is_said_only_where_a_test_says_so(report: Path) -> None:
     assert "Matched filter is better than" in together and together.count("better") == 1 and "16 seeds" in together
     assert {pair["better"] for pair in metrics["pairs"]["pairs_position_corners"]} == {"matched_filter", None}
     page = (report / "index.html").read_text()
-    assert page.count('<td class="better">matched filter is better') == sum(
+    assert page.count('<td class="better left">matched filter is better') == sum(
         pair["better"] is not None for pairs in metrics["pairs"].values() for pair in pairs
     )
 

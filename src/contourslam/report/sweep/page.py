@@ -25,6 +25,7 @@ from contourslam.report.sweep.values import Sweep
 _OWN = re.compile(r"(findings|table_one|paper|cells|matrix|pairs|logs|failures|noise|beams)(_.*)?\.(csv|tex|svg)")
 """What an earlier report may have left in ``tables/`` and ``figures/``."""
 
+_WORDS = ("shown", "condition", "cause")  # columns without numbers
 _SHOWN = re.compile(r"<(?:th|td|li|p|span|h3|summary)\b[^>]*>[^<]+")
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:cm|mrad|ms|s|m|beams)\b|%)")
 
@@ -161,7 +162,8 @@ def _html(item: Item, folder: Path) -> str:
         case Table(name, caption, headers, rows):
             write_text(folder / "tables" / f"{name}.csv", to_csv(headers, rows))
             write_text(folder / "tables" / f"{name}.tex", to_latex(caption, headers, rows))
-            return markup.table(caption, headers, rows, stacked=True)
+            words = [header for header in headers if header in _WORDS or header.endswith("better than")]
+            return markup.table(caption, headers, rows, stacked=True, words=words)
         case Charts(charts):
             return f'<div class="pair">{"".join(_chart(chart, folder) for chart in charts)}</div>'
         case Folded(summary, items):
