@@ -22,7 +22,7 @@ SPEED = """name = "speed"
 [simulation]
 rooms = "furnished_room"
 noise = [0.0, 0.02]
-seeds = 16
+seeds = 32
 duration = 60.0
 """
 KILLED = """name = "killed"
