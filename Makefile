@@ -24,7 +24,7 @@ demo: $(VENV)/.all ## Simulate a furnished room, compare the four detectors, wri
 	$(BIN)/contourslam run demo/recording --output demo/run --overwrite
 	@echo "Open demo/index.html in a browser; demo/run holds the map of the first recording."
 
-table-one: $(VENV)/.all ## Ask the paper's question anew and write docs/table_one.md; an hour on two cores. LOGS=FOLDER has the recordings.
+table-one: $(VENV)/.all ## Ask the paper's question anew and write docs/table_one.md; less than two hours on two cores. LOGS=FOLDER has the recordings.
 	mkdir -p out/table_one
 	$(BIN)/contourslam sweep examples/table_one.toml --output out/table_one/rooms || test $$? -eq 1
 	if test -d "$(LOGS)"; then \

@@ -7,7 +7,7 @@ from pathlib import Path
 _ALIKE = 0.6  # share of equal letters from which a name counts as a slip of another one
 
 
-def perhaps(name: str, choices: Iterable[str]) -> str:
+def perhaps(name: str, choices: Iterable[str], place: str = "") -> str:
     """Give the end of a message that asks whether the nearest choice was meant.
 
     Parameters
@@ -16,6 +16,8 @@ def perhaps(name: str, choices: Iterable[str]) -> str:
         What was asked for and is not there.
     choices : iterable of str
         What there is.
+    place : str
+        What the choice is written after, such as ``"slam."``.
 
     Returns
     -------
@@ -28,7 +30,7 @@ def perhaps(name: str, choices: Iterable[str]) -> str:
     '; did you mean teh_chin?'
     """
     found = _nearest(name, choices)
-    return f"; did you mean {found}?" if found else ""
+    return f"; did you mean {place}{found}?" if found else ""
 
 
 def no_such(kind: str, name: str, choices: Iterable[str]) -> str:

@@ -118,7 +118,7 @@ def build(kind: type[T], content: Any, place: str = "") -> T:
     for name in content:
         if name not in fields:
             known = f"; known here: {', '.join(fields)}"
-            raise ConfigError(f"unknown setting {place}{name}{perhaps(str(name), fields) or known}")
+            raise ConfigError(f"unknown setting {place}{name}{perhaps(str(name), fields, place) or known}")
     missing = [name for name, field in fields.items() if name not in content and not _has_default(field)]
     if missing:
         raise ConfigError(f"{place}{missing[0]} is missing")

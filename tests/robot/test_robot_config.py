@@ -38,7 +38,7 @@ def test_what_the_file_leaves_out_keeps_its_default(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("base:\n  wheel_bsae: 0.3\n", "unknown setting base.wheel_bsae; did you mean wheel_base?"),
+        ("base:\n  wheel_bsae: 0.3\n", "unknown setting base.wheel_bsae; did you mean base.wheel_base?"),
         ("bass: {}\n", "unknown setting bass; did you mean base?"),
         ("base:\n  flavour: 1\n", "unknown setting base.flavour; known here: port, left_radius"),
         ("base:\n  wheel_base: wide\n", "base.wheel_base must be a finite number, got 'wide'"),

@@ -92,7 +92,7 @@ class Fleet:
                 server_restarts=server_restarts,
             )
             fleet = replace(fleet, complete=fleet.complete and not interrupt.requested)
-            apart = why_apart(fleet.maps, lambda: interrupt.requested)
+            apart = list(UntilStopped(progress(why_apart(fleet.maps), "pair of maps"), interrupt))
         if interrupt.requested and not any(robot.told for robot in fleet.robots):
             raise KeyboardInterrupt
         if self.restart_robot is not None and not fleet.robots[0].restarts:

@@ -1,6 +1,6 @@
 """Why common maps stay apart in the end: those that are left, held against each other once more."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -9,6 +9,7 @@ from contourslam.fleet.shared import Shared
 from contourslam.joining.chart import Chart
 from contourslam.joining.find import find_joint
 from contourslam.joining.joint import Joint, Reason
+from contourslam.maps.saved_map import SavedMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,24 +32,32 @@ class KeptApart:
     best: Joint | None
 
 
-def why_apart(maps: Sequence[Shared], stopped: Callable[[], bool] = lambda: False) -> tuple[KeptApart, ...]:
-    """Say of each pair of common maps why they are two.
+def why_apart(maps: Sequence[Shared]) -> Iterator[KeptApart]:
+    """Say of each pair of common maps why they are two, one after the other.
 
     Parameters
     ----------
     maps : sequence of Shared
         As they are at the end.
-    stopped : callable
-        Asked before each pair; pairs that are left then are not told of.
+
+    Yields
+    ------
+    KeptApart
     """
-    charts = [Chart(shared.saved) for shared in maps] if len(maps) > 1 else []
-    told = []
-    for (first, one), (second, other) in combinations(zip(maps, charts, strict=False), 2):
-        if stopped():
-            break
-        found, numbers = find_joint(one, other), (first.number, second.number)
+    charts = {shared.number: _chart(shared.saved) for shared in maps}
+    for first, second in combinations(charts, 2):
+        one, other = charts[first], charts[second]
+        if one is None or other is None:
+            yield KeptApart((first, second), "nothing alike", None)
+            continue
+        found = find_joint(one, other)
         if isinstance(found, Joint):
-            told.append(KeptApart(numbers, "enough to merge", found))
+            yield KeptApart((first, second), "enough to merge", found)
         else:
-            told.append(KeptApart(numbers, found.reason, found.best))
-    return tuple(told)
+            yield KeptApart((first, second), found.reason, found.best)
+
+
+def _chart(saved: SavedMap) -> Chart | None:
+    """Give the chart of a map; None of a robot that saw nothing."""
+    seen = saved.keyframes is not None and len(saved.keyframes.points)
+    return Chart(saved) if seen else None

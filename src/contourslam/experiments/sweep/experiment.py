@@ -203,9 +203,7 @@ def _setting(name: str, given: Any) -> dict[str, Any]:
         build(Config, given)
     except ConfigError as error:
         key = re.sub(r"^unknown setting ", "", str(error)).partition(" ")[0].rstrip(";")
-        # What was meant is told as it must be written here: with its table.
-        message = str(error).replace("did you mean ", f"did you mean {''.join(key.rpartition('.')[:2])}")
-        raise _InSettingError(place, key, message) from error
+        raise _InSettingError(place, key, str(error)) from error
     return given
 
 

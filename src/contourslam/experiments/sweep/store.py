@@ -306,7 +306,7 @@ def _part(key: str, status: str) -> str:
 
 
 def _parsed(content: bytes, columns: list[str] | None) -> Any:
-    # It is in memory and small. Arrow's threads, when the program ends while one begins, bring it down (code 134).
+    # It is in memory and small: Arrow's threads would cost more than they save.
     parquet, source = require("pyarrow.parquet", "sweep"), _pa().BufferReader(content)
     table = parquet.read_table(source, columns=columns, use_threads=False, pre_buffer=False)
     if not {"key", "status"} <= set(table.column_names):
