@@ -1,11 +1,8 @@
 """Parts of the fleet's nodes by themselves: any robot's name, threads that meet, a full disk, what cannot be told."""
 
-import json
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -127,12 +124,6 @@ def test_sites_are_read_and_what_names_none_is_refused() -> None:
     for wrong in ("robot1", "robot1:", ":ground", "robot 1:ground", "robot1:ground,robot1:first"):
         with pytest.raises(ConfigError, match="parameter sites"):
             FleetConfig(sites=wrong)
-
-
-def test_what_tells_a_fleet_is_compiled_before_the_robot_maps(compiled: None) -> None:
-    program = Path(__file__).with_name("fleet_rehearsed.py")
-    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == []
 
 
 @pytest.mark.parametrize("link", [None, "a link"])

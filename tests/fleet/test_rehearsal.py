@@ -11,8 +11,9 @@ pytest.importorskip("gtsam", reason="needs the extra 'graph'")
 pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 
 
-def test_after_the_rehearsal_a_fleet_compiles_nothing() -> None:
+@pytest.mark.parametrize("who", ["fleet", "robot"])
+def test_after_the_rehearsal_nothing_is_compiled(who: str) -> None:
     program = Path(__file__).with_name("rehearsed.py")
-    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, str(program), who], capture_output=True, text=True, check=False)
     assert done.stderr == ""
     assert json.loads(done.stdout) == []
