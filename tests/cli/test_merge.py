@@ -16,7 +16,6 @@ pytest.importorskip("shapely", reason="needs the extra 'simulation'")
 from contourslam.cli import main
 from contourslam.cli.interrupt import INTERRUPTED
 from contourslam.cli.locate import UNSURE
-from contourslam.cli.merge import Verdict
 from contourslam.config import Config
 from contourslam.geometry.poses import between, interpolate
 from contourslam.graph import GraphSlam, kept
@@ -25,6 +24,7 @@ from contourslam.joining.groups import LeftOut
 from contourslam.joining.joint import Apart, Evidence, Joint
 from contourslam.maps import SavedMap, load_map, save_map
 from contourslam.recordings import read_trajectory, write_trajectory
+from contourslam.report.joints import Verdict
 from contourslam.scan import LaserScan, Odometry, TruePose
 from contourslam.simulation.long_drive import building_drive
 

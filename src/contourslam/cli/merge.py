@@ -17,10 +17,10 @@ from contourslam.cli.options import Flag, Json
 from contourslam.errors import ConfigError, MapError, ResultError
 
 if TYPE_CHECKING:
-    from contourslam.joining.groups import LeftOut
     from contourslam.joining.joint import Apart, Joint
     from contourslam.joining.merging import Merged
     from contourslam.maps import SavedMap
+    from contourslam.report.joints import Verdict
 
     Pair = tuple[int, int]
 
@@ -57,6 +57,8 @@ class Merge:
 
     def execute(self, command: str) -> int:
         """Find the joints, solve each group, write the maps and say what was joined and why."""
+        from contourslam.report.joints import Verdict
+
         paths = [_map_in(path) if path.is_dir() else path for path in self.maps]
         names = self._checked(paths)
         maps = [_load(path) for path in paths]
@@ -257,62 +259,7 @@ def _carry(path: Path, old: "SavedMap", new: "SavedMap", keys: Any, target: Path
     return str(target)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What became of a pair of maps.
-
-    Attributes
-    ----------
-    names : (str, str)
-    found : Joint, Apart or int
-        Of maps that hold the same drive, how many keyframes they share.
-    left_out : LeftOut or None
-        Where the joint contradicts surer ones.
-    """
-
-    names: tuple[str, str]
-    found: "Joint | Apart | int"
-    left_out: "LeftOut | None"
-
-    def as_json(self) -> dict[str, Any]:
-        """Give the verdict with its evidence."""
-        from contourslam.joining.joint import Joint
-        from contourslam.report.joints import joint_figures
-
-        told: dict[str, Any] = {"maps": self.names}
-        if isinstance(self.found, int):
-            return told | {"joined": True, "shared_keyframes": self.found}
-        if isinstance(self.found, Joint):
-            told |= {"joined": self.left_out is None, **joint_figures(self.found)}
-            if self.left_out is not None:
-                told |= {"reason": "contradicts others", "off": self.left_out.off, "sigma": self.left_out.sigma}
-            return told
-        best = None if self.found.best is None else joint_figures(self.found.best)
-        return told | {"joined": False, "reason": self.found.reason, "best": best}
-
-    def __str__(self) -> str:
-        from contourslam.joining.joint import Joint
-
-        who = f"{self.names[0]} and {self.names[1]}: "
-        if isinstance(self.found, int):
-            return who + f"joined, both hold the same drive ({self.found} keyframes)"
-        if isinstance(self.found, Joint):
-            if self.left_out is None:
-                return who + f"joined by {self.found.method}: {_evidence(self.found)}"
-            off, sigma = (math.hypot(*row[:2]) for row in (self.left_out.off, self.left_out.sigma))
-            return who + f"left out, {off:.2f} m off what surer joints say (σ {sigma:.2f} m): {_evidence(self.found)}"
-        if self.found.best is None:
-            return who + f"apart, {self.found.reason}"
-        return who + f"apart, {self.found.reason}: at best {_evidence(self.found.best)}"
-
-
-def _evidence(joint: "Joint") -> str:
-    from contourslam.report.joints import evidence_in_words, joint_figures
-
-    return evidence_in_words(joint_figures(joint))
-
-
-def _print(pairs: list[Verdict], told: list[dict[str, Any]], alone: list[str], output: Path) -> None:
+def _print(pairs: "list[Verdict]", told: list[dict[str, Any]], alone: list[str], output: Path) -> None:
     for pair in pairs:
         print(pair)
     for one in told:
